@@ -1,0 +1,337 @@
+"""Every message between Oxbow's processes, and the endpoints that exchange them.
+
+All geometry is planar, in metres, in the mission's local frame (`oxbow.frame`): x east, y north.
+A message that exists is valid: `__post_init__` enforces its invariants on both sides of the bus.
+Key expressions stand here and nowhere else.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+import re
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+from shapely import LineString, Polygon
+
+from oxbow.errors import InvalidMission
+
+__all__ = [
+    "CERTIFY",
+    "CONTOUR",
+    "DECOMPOSE",
+    "PATH",
+    "STAGES",
+    "Cell",
+    "Certificate",
+    "CertifyRequest",
+    "ContourRequest",
+    "CriticalKind",
+    "CriticalPoint",
+    "DecomposeRequest",
+    "Decomposition",
+    "DroppedPart",
+    "Endpoint",
+    "FloatArray",
+    "FreeSpace",
+    "HeadingScore",
+    "Message",
+    "Method",
+    "PathPlan",
+    "PathRequest",
+    "Place",
+    "SpacingStep",
+]
+
+FloatArray = npt.NDArray[np.float64]
+Place = tuple[float, float]
+"""A planar position (x east, y north) in metres."""
+
+Q = TypeVar("Q", bound="Message")
+R = TypeVar("R", bound="Message")
+
+
+class Message(msgspec.Struct, frozen=True, kw_only=True):
+    """Base of every message on the bus between Oxbow's own processes."""
+
+
+def require_finite(message: Message, *fields: str, least: float = -math.inf, above: float = -math.inf) -> None:
+    """Check numeric fields of a message: finite, at least `least`, strictly above `above`."""
+    for field in fields:
+        value = getattr(message, field)
+        if value is not None and not (math.isfinite(value) and value >= least and value > above):
+            accepted = f"> {above}" if above > -math.inf else f">= {least}" if least > -math.inf else "any"
+            raise InvalidMission(f"is {value!r}; expected a finite number, {accepted}", where=field)
+
+
+def require_area(message: Message, *fields: str) -> None:
+    """Check polygon fields of a message: valid, with an area."""
+    for field in fields:
+        polygon = getattr(message, field)
+        if polygon.is_empty or not polygon.is_valid:
+            raise InvalidMission("is empty or not a valid polygon", where=field)
+
+
+class Method(enum.StrEnum):
+    """A way to generate a path; the names are the report's (Rendas and Li 2016, section 1.1)."""
+
+    TRANSECT = "Transect"
+
+
+# --------------------------------------------------------------------------- contour
+
+
+class DroppedPart(Message, frozen=True, kw_only=True):
+    """Water that a stage leaves out, and why."""
+
+    area_m2: float
+    reason: str
+    place: Place
+    outline: Polygon
+
+
+class ContourRequest(Message, frozen=True, kw_only=True):
+    """The site as the mission describes it: the valid outline (no holes) and the forbidden zones.
+
+    `spacing_m` is the nominal spacing of transects, area / length: the scale of detail that matters.
+    `tolerance_m` is the half width of the strip a simplified edge may stand for; by default it is
+    derived from `safety_m` and `spacing_m`.
+    """
+
+    outline: Polygon
+    zones: tuple[Polygon, ...] = ()
+    safety_m: float = 0.0
+    spacing_m: float
+    tolerance_m: float | None = None
+
+    def __post_init__(self) -> None:
+        require_area(self, "outline")
+        require_finite(self, "safety_m", "tolerance_m", least=0.0)
+        require_finite(self, "spacing_m", above=0.0)
+
+
+class FreeSpace(Message, frozen=True, kw_only=True):
+    """Where a vehicle may go.
+
+    `free` is one polygon (islands are holes), valid, and inside the true outline eroded by the safety
+    distance. `water` is the true water, not eroded, that launch and recovery legs may cross.
+    """
+
+    free: Polygon
+    water: Polygon
+    tolerance_m: float
+    compression: float
+    dropped: tuple[DroppedPart, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        require_area(self, "free")
+
+
+# --------------------------------------------------------------------------- decomposition
+
+
+class CriticalKind(enum.StrEnum):
+    """What happens to the sweep line's cells at a critical point."""
+
+    OPEN = "open"
+    CLOSE = "close"
+    SPLIT = "split"
+    MERGE = "merge"
+
+
+class CriticalPoint(Message, frozen=True, kw_only=True):
+    """A vertex at which the number of cells on the sweep line changes; `place` is planar."""
+
+    kind: CriticalKind
+    place: Place
+
+
+class Cell(Message, frozen=True, kw_only=True):
+    """A region between a floor and a ceiling, met by every transect line in one interval.
+
+    `floor` and `ceiling` are float arrays of shape (n, 2) in the *sweep frame* of the decomposition
+    (u across the transects, v along them), both with non-decreasing u, and with equal first and equal
+    last u. `start` and `end` are indices of the critical points at which the cell begins and ends.
+    """
+
+    floor: FloatArray
+    ceiling: FloatArray
+    start: int
+    end: int
+
+    def __post_init__(self) -> None:
+        for field in ("floor", "ceiling"):
+            chain = getattr(self, field)
+            if chain.ndim != 2 or chain.shape[1] != 2 or len(chain) < 1 or (np.diff(chain[:, 0]) < 0).any():
+                raise InvalidMission("is not an (n, 2) chain with non-decreasing u", where=field)
+
+
+class HeadingScore(Message, frozen=True, kw_only=True):
+    """The predicted cost of one heading: metres of path per square metre of water, less is better."""
+
+    heading_rad: float
+    predicted_cost: float
+
+
+class DecomposeRequest(Message, frozen=True, kw_only=True):
+    """Free space to cut into cells; the best of several headings where `heading_rad` is absent."""
+
+    free: Polygon
+    spacing_m: float
+    heading_rad: float | None = None
+
+    def __post_init__(self) -> None:
+        require_area(self, "free")
+        require_finite(self, "spacing_m", above=0.0)
+        require_finite(self, "heading_rad")
+
+
+class Decomposition(Message, frozen=True, kw_only=True):
+    """Cells that tile the free space, and the critical points between them: the Reeb graph.
+
+    Transects run along `heading_rad` (clockwise from north). Sweep frame and planar frame differ by a
+    rotation: u = x cos h - y sin h, v = x sin h + y cos h. The Reeb graph's nodes are the critical points,
+    its edges the cells (`start` -> `end`).
+    """
+
+    heading_rad: float
+    cells: tuple[Cell, ...]
+    critical_points: tuple[CriticalPoint, ...]
+    scores: tuple[HeadingScore, ...] = ()
+
+
+# --------------------------------------------------------------------------- path
+
+
+class PathRequest(Message, frozen=True, kw_only=True):
+    """What a path must keep to: the water, its cells, the longest length, the least spacing."""
+
+    method: Method = Method.TRANSECT
+    space: FreeSpace
+    decomposition: Decomposition
+    launch: Place
+    recovery: Place
+    length_m: float
+    min_spacing_m: float = 0.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        require_finite(self, "length_m", above=0.0)
+        require_finite(self, "min_spacing_m", least=0.0)
+
+
+class SpacingStep(Message, frozen=True, kw_only=True):
+    """One turn of the spacing loop (report, steps 5 to 8): the spacing tried and the length it gave."""
+
+    spacing_m: float
+    length_m: float
+
+
+class PathPlan(Message, frozen=True, kw_only=True):
+    """A path from launch to recovery, simple and inside the free space (legs in the water)."""
+
+    path: LineString
+    spacing_m: float
+    steps: tuple[SpacingStep, ...]
+    dropped: tuple[DroppedPart, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+# --------------------------------------------------------------------------- certificate
+
+
+class CertifyRequest(Message, frozen=True, kw_only=True):
+    """A path to judge against the mission itself: the true outline and zones, not the planner's free space."""
+
+    outline: Polygon
+    zones: tuple[Polygon, ...] = ()
+    safety_m: float = 0.0
+    path: LineString
+    launch: Place
+    recovery: Place
+    speed_mps: float = 1.0
+
+
+class Certificate(Message, frozen=True, kw_only=True):
+    """How good a path is against what is possible; the measures are defined in `docs/quality.md`.
+
+    `cover_radius_m` are certified (low, high) bounds of the largest distance from a point of the free space to
+    the path (report, section 1.2.1, MinMax); `least_radius_m` is the least any path of that length could reach.
+    """
+
+    length_m: float
+    duration_s: float
+    waypoints: int
+    is_simple: bool
+    crossings: int
+    outside_m: float
+    unsafe_m: float
+    components: int
+    free_area_m2: float
+    judged_area: float
+    cover_radius_m: tuple[float, float]
+    least_radius_m: float
+    q: float
+    mean_distance_m: float
+    p95_distance_m: float
+    mean_ratio: float
+    p95_ratio: float
+    worst_gap: Place | None = None
+
+
+# --------------------------------------------------------------------------- endpoints and keys
+
+PREFIX = "oxbow/v1"
+MAX_REQUEST_BYTES = 64 * 2**20
+_ID = re.compile(r"[A-Za-z0-9_.-]+")
+
+
+def checked_id(text: str, where: str = "id") -> str:
+    """`text`, if it may stand as one chunk of a key expression."""
+    if not _ID.fullmatch(text):
+        raise InvalidMission(f"is {text!r}; expected one or more of A-Z a-z 0-9 _ . -", where=where)
+    return text
+
+
+@dataclass(frozen=True)
+class Endpoint(Generic[Q, R]):
+    """One request/reply exchange that a stage serves."""
+
+    stage: str
+    request: type[Q]
+    reply: type[R]
+
+    def instance_key(self, instance: str) -> str:
+        """Where one replica of the stage takes queries."""
+        return f"{PREFIX}/stage/{self.stage}/{checked_id(instance)}"
+
+    def live_key(self, instance: str) -> str:
+        """The liveliness token of one replica; ``*`` in place of an instance matches all."""
+        return f"{PREFIX}/live/{self.stage}/{instance}"
+
+
+CONTOUR: Endpoint[ContourRequest, FreeSpace] = Endpoint("contour", ContourRequest, FreeSpace)
+DECOMPOSE: Endpoint[DecomposeRequest, Decomposition] = Endpoint("decomposition", DecomposeRequest, Decomposition)
+PATH: Endpoint[PathRequest, PathPlan] = Endpoint("path", PathRequest, PathPlan)
+CERTIFY: Endpoint[CertifyRequest, Certificate] = Endpoint("certificate", CertifyRequest, Certificate)
+
+STAGES: tuple[Endpoint[Any, Any], ...] = (CONTOUR, DECOMPOSE, PATH, CERTIFY)
+
+
+def mission_key(mission_id: str, what: str) -> str:
+    """``oxbow/v1/mission/{id}/{what}``; `what` is request, status, plan, report or replan."""
+    return f"{PREFIX}/mission/{checked_id(mission_id)}/{what}"
+
+
+PLAN_KEY = f"{PREFIX}/plan"
+ANY_MISSION_REQUEST = f"{PREFIX}/mission/*/request"
+
+
+def layer_key(mission_id: str, stage: str, name: str) -> str:
+    """Where a stage's layer of one mission is put."""
+    return f"{PREFIX}/layer/{checked_id(mission_id)}/{checked_id(stage)}/{checked_id(name)}"

@@ -1,0 +1,106 @@
+"""The one family of errors that Oxbow raises, and the form in which they travel.
+
+Every error has a closed `code`, a message that names the offending field and value and says what would
+be accepted, and `where`: the field, vertex or stage it came from.
+"""
+
+from __future__ import annotations
+
+import enum
+from typing import ClassVar
+
+import msgspec
+
+__all__ = [
+    "Busy",
+    "DeadlineExceeded",
+    "ErrorCode",
+    "ErrorReply",
+    "Infeasible",
+    "Internal",
+    "InvalidMission",
+    "OxbowError",
+    "Unavailable",
+]
+
+
+class ErrorCode(enum.StrEnum):
+    """What went wrong, as a closed set; the command's exit status follows from it."""
+
+    INVALID_MISSION = "invalid_mission"
+    INFEASIBLE = "infeasible"
+    UNAVAILABLE = "unavailable"
+    BUSY = "busy"
+    TIMEOUT = "timeout"
+    INTERNAL = "internal"
+
+
+class OxbowError(Exception):
+    """Base of all errors that Oxbow raises on purpose."""
+
+    code: ClassVar[ErrorCode] = ErrorCode.INTERNAL
+
+    def __init__(self, message: str, where: str = "") -> None:
+        super().__init__(message, where)
+        self.message = message
+        self.where = where
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.message}" if self.where else self.message
+
+
+class InvalidMission(OxbowError):
+    """The input breaks a rule of the Mission File or of a message."""
+
+    code = ErrorCode.INVALID_MISSION
+
+
+class Infeasible(OxbowError):
+    """The input is well formed, but no plan can satisfy it."""
+
+    code = ErrorCode.INFEASIBLE
+
+
+class Unavailable(OxbowError):
+    """No service answered, after every retry that the deadline allowed."""
+
+    code = ErrorCode.UNAVAILABLE
+
+
+class Busy(OxbowError):
+    """The service's queue is full: try again later."""
+
+    code = ErrorCode.BUSY
+
+
+class DeadlineExceeded(OxbowError):
+    """The deadline passed before an answer came."""
+
+    code = ErrorCode.TIMEOUT
+
+
+class Internal(OxbowError):
+    """A fault of Oxbow itself."""
+
+    code = ErrorCode.INTERNAL
+
+
+BY_CODE: dict[ErrorCode, type[OxbowError]] = {
+    kind.code: kind for kind in (InvalidMission, Infeasible, Unavailable, Busy, DeadlineExceeded, Internal)
+}
+
+
+class ErrorReply(msgspec.Struct, frozen=True, kw_only=True):
+    """An error as it travels on the bus (JSON)."""
+
+    code: ErrorCode
+    message: str
+    where: str = ""
+
+    @classmethod
+    def of(cls, error: OxbowError) -> ErrorReply:
+        return cls(code=error.code, message=error.message, where=error.where)
+
+    def error(self) -> OxbowError:
+        """The exception to raise at the caller's side."""
+        return BY_CODE[self.code](self.message, self.where)

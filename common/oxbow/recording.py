@@ -1,0 +1,80 @@
+"""What a stage shows of its work: named layers of geometry, put on the bus for whoever draws.
+
+A stage calls `show(Layer(...))`; it neither knows nor waits for a recorder. There is no drawing code here.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable
+
+import msgspec
+from shapely.geometry.base import BaseGeometry
+
+__all__ = ["Colour", "Layer", "Show", "discard"]
+
+Colour = tuple[int, int, int]
+
+
+class LayerKind(enum.StrEnum):
+    """How a layer is drawn."""
+
+    GEOMETRY = "geometry"
+    GRAPH = "graph"
+    SCALARS = "scalars"
+    LOG = "log"
+
+
+class Layer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One named layer of a stage.
+
+    Parameters
+    ----------
+    stage, name
+        Where the layer stands in the recording, e.g. ``contour`` / ``simplified``.
+    step
+        The iteration that it belongs to; layers of one name and rising steps are played one after another.
+    geometries
+        Points, lines and polygons in planar metres (of the mission's frame).
+    labels, values
+        One a geometry, or none. Values (0..1) colour the geometries on the recorder's scale.
+    colour
+        One colour for the whole layer; the recorder's palette where it is absent.
+    nodes, edges
+        A graph's node labels and its edges as pairs of node indices; its geometries are the nodes' places.
+    scalars
+        Named figures of this step (timings in s, lengths in m, ...).
+    text
+        A line for the log.
+    """
+
+    stage: str
+    name: str
+    kind: LayerKind = LayerKind.GEOMETRY
+    step: int = 0
+    geometries: tuple[BaseGeometry, ...] = ()
+    labels: tuple[str, ...] = ()
+    values: tuple[float, ...] = ()
+    colour: Colour | None = None
+    width_m: float = 0.0
+    nodes: tuple[str, ...] = ()
+    edges: tuple[tuple[int, int], ...] = ()
+    scalars: dict[str, float] = {}
+    text: str = ""
+
+    def __post_init__(self) -> None:
+        for field in ("labels", "values"):
+            given = len(getattr(self, field))
+            if given not in (0, len(self.geometries)):
+                raise ValueError(
+                    f"layer {self.stage}/{self.name}: {given} {field} for {len(self.geometries)} geometries;"
+                    " give none or one for each"
+                )
+
+
+Show = Callable[[Layer], None]
+"""What a stage is given to show its layers with."""
+
+
+def discard(layer: Layer) -> None:
+    """Show nothing: for a caller that keeps no recording."""
