@@ -11,7 +11,7 @@ from collections.abc import Callable
 import msgspec
 from shapely.geometry.base import BaseGeometry
 
-__all__ = ["Colour", "Layer", "Show", "discard"]
+__all__ = ["Colour", "Layer", "LayerKind", "Show", "Stamped", "discard"]
 
 Colour = tuple[int, int, int]
 
@@ -70,6 +70,30 @@ class Layer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
                     f"layer {self.stage}/{self.name}: {given} {field} for {len(self.geometries)} geometries;"
                     " give none or one for each"
                 )
+
+
+class Stamped(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A layer as it travels on the bus: whose it is, when it was shown, and where its plane lies.
+
+    Parameters
+    ----------
+    mission_id
+        The mission whose recording it belongs to.
+    origin
+        Latitude and longitude (degrees, WGS84) of the planar frame's origin; no map is drawn where it is absent.
+    request_id
+        The run of the mission: another run of one mission is another recording.
+    time_s
+        Unix time at which the stage showed the layer.
+    layer
+        What was shown.
+    """
+
+    mission_id: str
+    origin: tuple[float, float] | None = None
+    request_id: str = ""
+    time_s: float
+    layer: Layer
 
 
 Show = Callable[[Layer], None]
