@@ -256,6 +256,13 @@ class CertifyRequest(Message, frozen=True, kw_only=True):
     recovery: Place
     speed_mps: float = 1.0
 
+    def __post_init__(self) -> None:
+        require_area(self, "outline")
+        require_finite(self, "safety_m", least=0.0)
+        require_finite(self, "speed_mps", above=0.0)
+        if not (0 < self.path.length < math.inf):
+            raise InvalidMission(f"is {self.path.length!r} m long; expected a path of finite length > 0", where="path")
+
 
 class Certificate(Message, frozen=True, kw_only=True):
     """How good a path is against what is possible; the measures are defined in `docs/quality.md`.

@@ -1,0 +1,71 @@
+"""The certificate of a path: every measure of it, from the mission's own water."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import shapely
+
+from oxbow.contracts import Certificate, CertifyRequest
+from oxbow_certificate.conformance import count_crossings, outside_length, unsafe_length
+from oxbow_certificate.cover import cover_radius, least_radius
+from oxbow_certificate.distance import PathDistance
+from oxbow_certificate.region import JudgedSpace
+from oxbow_certificate.spread import DistanceSpread, distance_spread
+
+__all__ = ["Judgement", "certify", "judge"]
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """A certificate and what it was computed from."""
+
+    certificate: Certificate
+    space: JudgedSpace
+    spread: DistanceSpread
+
+
+def certify(request: CertifyRequest) -> Certificate:
+    """The certificate of a path; see `judge`."""
+    return judge(request).certificate
+
+
+def judge(request: CertifyRequest) -> Judgement:
+    """Measure a path against its mission and against the best that its length allows.
+
+    A bad path is reported, not refused. A path that enters no part of the free space is judged
+    on all of it, with a `judged_area` of 0, so that every figure is finite.
+
+    Raises
+    ------
+    Infeasible
+        The zones or the safety distance leave no water to judge on.
+    """
+    path = request.path
+    space = JudgedSpace.of(request)
+    distance = PathDistance(path)
+    cover = cover_radius(space.judged, distance)
+    spread = distance_spread(space.judged, distance)
+    least_m = least_radius(space.judged.area, path.length)
+    crossings = count_crossings(path)
+    certificate = Certificate(
+        length_m=path.length,
+        duration_s=path.length / request.speed_mps,
+        waypoints=int(shapely.get_num_coordinates(path)),
+        is_simple=crossings == 0,
+        crossings=crossings,
+        outside_m=outside_length(path, space),
+        unsafe_m=unsafe_length(path, space, request.safety_m, (request.launch, request.recovery)),
+        components=len(space.free.geoms),
+        free_area_m2=space.free.area,
+        judged_area=space.judged_area,
+        cover_radius_m=(cover.low_m, cover.high_m),
+        least_radius_m=least_m,
+        q=cover.high_m / least_m,
+        mean_distance_m=spread.mean_m,
+        p95_distance_m=spread.p95_m,
+        mean_ratio=spread.mean_m / (least_m / 2),
+        p95_ratio=spread.p95_m / least_m,
+        worst_gap=cover.place,
+    )
+    return Judgement(certificate, space, spread)

@@ -1,0 +1,33 @@
+"""Distance to a path."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from shapely import LineString, STRtree
+
+from oxbow.contracts import FloatArray
+
+__all__ = ["PathDistance", "segments_of"]
+
+
+def segments_of(path: LineString) -> npt.NDArray[Any]:
+    """The segments of `path` as lines, in order, without those of no length."""
+    xy = shapely.get_coordinates(path)
+    ends = np.stack([xy[:-1], xy[1:]], axis=1)
+    return np.asarray(shapely.linestrings(ends[(ends[:, 0] != ends[:, 1]).any(axis=1)]))
+
+
+class PathDistance:
+    """Exact distance from places to a path, by an R-tree of its segments (Leutenegger et al. 1997, STR packing)."""
+
+    def __init__(self, path: LineString) -> None:
+        self._tree = STRtree(segments_of(path))
+
+    def __call__(self, places: FloatArray) -> FloatArray:
+        """Distances (n,) in metres from `places` (n, 2) to the path."""
+        _, distances = self._tree.query_nearest(shapely.points(places), return_distance=True, all_matches=False)
+        return np.asarray(distances)

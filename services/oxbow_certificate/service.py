@@ -1,0 +1,56 @@
+"""The stage `certificate`: judges a path and shows where it leaves gaps."""
+
+from __future__ import annotations
+
+import shapely
+from shapely import Point
+
+from oxbow.contracts import Certificate, CertifyRequest
+from oxbow.recording import Layer, LayerKind, Show
+from oxbow_certificate.certify import Judgement, judge
+
+__all__ = ["handle"]
+
+STAGE = "certificate"
+RED = (214, 47, 39)
+
+GAP_RATIO = 1.5
+"""Places farther from the path than so many least radii are shown as gaps; ideal transects have none above 1."""
+
+SCALARS = ("length_m", "q", "mean_ratio", "p95_ratio", "outside_m", "unsafe_m", "judged_area", "crossings")
+
+
+def handle(request: CertifyRequest, show: Show) -> Certificate:
+    """Certify a request's path, and show the path, its gaps, the worst of them and the figures.
+
+    Raises
+    ------
+    Infeasible
+        The zones or the safety distance leave no water to judge on.
+    """
+    judgement = judge(request)
+    show(Layer(stage=STAGE, name="path", geometries=(request.path,)))
+    show(_gaps(judgement))
+    show(_worst_gap(judgement.certificate))
+    figures = {name: float(getattr(judgement.certificate, name)) for name in SCALARS}
+    show(Layer(stage=STAGE, name="figures", kind=LayerKind.SCALARS, scalars=figures))
+    return judgement.certificate
+
+
+def _gaps(judgement: Judgement) -> Layer:
+    """Sampled places that lie far from the path, coloured by their distance as a share of the largest."""
+    certificate, spread = judgement.certificate, judgement.spread
+    far = spread.distance_m > GAP_RATIO * certificate.least_radius_m
+    return Layer(
+        stage=STAGE,
+        name="gaps",
+        geometries=tuple(shapely.points(spread.places[far])),
+        values=tuple((spread.distance_m[far] / certificate.cover_radius_m[1]).tolist()),
+    )
+
+
+def _worst_gap(certificate: Certificate) -> Layer:
+    label = f"{certificate.cover_radius_m[1]:.0f} m from the path ({certificate.q:.2f} times the least possible)"
+    return Layer(
+        stage=STAGE, name="worst_gap", geometries=(Point(certificate.worst_gap),), labels=(label,), colour=RED
+    )
