@@ -8,7 +8,7 @@ import shapely
 
 from oxbow.contracts import Certificate, CertifyRequest
 from oxbow_certificate.conformance import count_crossings, outside_length, unsafe_length
-from oxbow_certificate.cover import cover_radius, least_radius
+from oxbow_certificate.cover import CoverRadius, cover_radius, least_radius
 from oxbow_certificate.distance import PathDistance
 from oxbow_certificate.region import JudgedSpace
 from oxbow_certificate.spread import DistanceSpread, distance_spread
@@ -22,6 +22,7 @@ class Judgement:
 
     certificate: Certificate
     space: JudgedSpace
+    cover: CoverRadius
     spread: DistanceSpread
 
 
@@ -68,4 +69,4 @@ def judge(request: CertifyRequest) -> Judgement:
         p95_ratio=spread.p95_m / least_m,
         worst_gap=cover.place,
     )
-    return Judgement(certificate, space, spread)
+    return Judgement(certificate, space, cover, spread)

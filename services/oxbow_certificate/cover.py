@@ -39,8 +39,9 @@ class Farthest(NamedTuple):
 def least_radius(area_m2: float, length_m: float) -> float:
     """Least cover radius that a path of a given length could reach over a given area, in metres.
 
-    The places within r of a connected curve of length L fill no more than 2 r L + pi r^2 (Hotelling 1939), and they must
-    fill the area; this is the positive root, in the form that does not cancel when L^2 is far above the area.
+    The places within r of a connected curve of length L fill no more than 2 r L + pi r^2 (Hotelling 1939), and
+    they must fill the area. This is the positive root, in the form that loses no digits where L^2 is far above the
+    area.
     """
     return area_m2 / (length_m + math.sqrt(length_m**2 + math.pi * area_m2))
 
@@ -50,8 +51,8 @@ def cover_radius(
 ) -> CoverRadius:
     """Bound the largest distance from a place of `region` to a path (Rendas and Li 2016, section 1.2.1, MinMax).
 
-    Distance changes by no more than the way gone (it is 1-Lipschitz), so that over a square it is at most that of the
-    centre plus half the diagonal. Squares whose bound is not above what some place of the region attains are
+    Distance changes by no more than the way gone (it is 1-Lipschitz), so that over a square it is at most that of
+    the centre plus half the diagonal. Squares whose bound is not above what some place of the region attains are
     dropped, the others quartered: the method of Shubert (1972) on a quadtree in place of an interval.
 
     Parameters

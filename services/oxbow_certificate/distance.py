@@ -21,11 +21,15 @@ def segments_of(path: LineString) -> npt.NDArray[Any]:
     return np.asarray(shapely.linestrings(ends[(ends[:, 0] != ends[:, 1]).any(axis=1)]))
 
 
+_PIECES = 8_000
+"""A path is cut into some so many pieces at least: the box of a long oblique segment is mostly empty."""
+
+
 class PathDistance:
-    """Exact distance from places to a path, by an R-tree of its segments (Leutenegger et al. 1997, STR packing)."""
+    """Exact distance from places to a path, by an R-tree of its segments (STR, Leutenegger et al. 1997)."""
 
     def __init__(self, path: LineString) -> None:
-        self._tree = STRtree(segments_of(path))
+        self._tree = STRtree(segments_of(path.segmentize(path.length / _PIECES)))
 
     def __call__(self, places: FloatArray) -> FloatArray:
         """Distances (n,) in metres from `places` (n, 2) to the path."""

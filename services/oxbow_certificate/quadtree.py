@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray
 
@@ -24,10 +25,20 @@ class Squares:
     half_m: float
 
     @classmethod
-    def around(cls, region: shapely.Geometry) -> Squares:
+    def around(cls, region: BaseGeometry) -> Squares:
         """The one square about the bounds of `region`."""
         west, south, east, north = region.bounds
         return cls(np.array([[(west + east) / 2, (south + north) / 2]]), max(east - west, north - south) / 2)
+
+    @classmethod
+    def tiling(cls, region: BaseGeometry, side_m: float) -> Squares:
+        """The squares with sides of `side_m` that meet `region`."""
+        root = cls.around(region)
+        levels = math.ceil(math.log2(max(2 * root.half_m / side_m, 1.0)))
+        squares = cls(root.centres, side_m * 2**levels / 2)
+        for _ in range(levels):
+            squares = squares.quarters().meeting(region)
+        return squares
 
     def __len__(self) -> int:
         return len(self.centres)
@@ -41,7 +52,7 @@ class Squares:
         """The squares chosen by a mask of shape (n,)."""
         return Squares(self.centres[keep], self.half_m)
 
-    def meeting(self, region: shapely.Geometry) -> Squares:
+    def meeting(self, region: BaseGeometry) -> Squares:
         """The squares that have a point of `region`."""
         low, high = self.centres - self.half_m, self.centres + self.half_m
         return self.where(shapely.intersects(region, shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])))

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import shapely
-from shapely import MultiPolygon
+from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import CertifyRequest
 from oxbow.errors import Infeasible
@@ -13,7 +14,7 @@ from oxbow.errors import Infeasible
 __all__ = ["QUAD_SEGS", "JudgedSpace"]
 
 QUAD_SEGS = 16
-"""Segments for a quarter circle of an eroded contour: chords leave 0.12 % of the radius, well inside the 1 % promised."""
+"""Segments for a quarter circle of an eroded contour: its chords come 0.12 % of the safety distance nearer."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class JudgedSpace:
         The share of the free area that the path enters, 0 to 1.
     """
 
-    water: shapely.Geometry
+    water: Polygon | MultiPolygon
     free: MultiPolygon
     judged: MultiPolygon
     judged_area: float
@@ -46,12 +47,10 @@ class JudgedSpace:
         Infeasible
             The zones or the safety distance leave no water.
         """
-        water = shapely.difference(request.outline, shapely.union_all(request.zones))
+        water = request.outline.difference(shapely.union_all(request.zones))
         if not water.area > 0:
             raise Infeasible("cover the whole outline; expected some water between them", where="zones")
-        parts = _polygons(
-            shapely.buffer(water, -request.safety_m, quad_segs=QUAD_SEGS) if request.safety_m else water
-        )
+        parts = _polygons(water.buffer(-request.safety_m, quad_segs=QUAD_SEGS) if request.safety_m else water)
         if not parts:
             raise Infeasible(
                 f"is {request.safety_m:g} m, which leaves no water; expected less than {_inradius(water):g} m",
@@ -63,10 +62,10 @@ class JudgedSpace:
         return cls(water, free, judged, sum(part.area for part in entered) / free.area)
 
 
-def _polygons(geometry: shapely.Geometry) -> list[shapely.Polygon]:
-    return [part for part in shapely.get_parts(geometry) if part.geom_type == "Polygon" and part.area > 0]
+def _polygons(geometry: BaseGeometry) -> list[Polygon]:
+    return [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon) and part.area > 0]
 
 
-def _inradius(water: shapely.Geometry) -> float:
+def _inradius(water: BaseGeometry) -> float:
     """Radius of the largest disc that fits in the water, in metres."""
     return max(shapely.maximum_inscribed_circle(part).length for part in _polygons(water))

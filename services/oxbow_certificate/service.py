@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shapely
 from shapely import Point
 
 from oxbow.contracts import Certificate, CertifyRequest
@@ -31,7 +30,7 @@ def handle(request: CertifyRequest, show: Show) -> Certificate:
     judgement = judge(request)
     show(Layer(stage=STAGE, name="path", geometries=(request.path,)))
     show(_gaps(judgement))
-    show(_worst_gap(judgement.certificate))
+    show(_worst_gap(judgement))
     figures = {name: float(getattr(judgement.certificate, name)) for name in SCALARS}
     show(Layer(stage=STAGE, name="figures", kind=LayerKind.SCALARS, scalars=figures))
     return judgement.certificate
@@ -39,18 +38,17 @@ def handle(request: CertifyRequest, show: Show) -> Certificate:
 
 def _gaps(judgement: Judgement) -> Layer:
     """Sampled places that lie far from the path, coloured by their distance as a share of the largest."""
-    certificate, spread = judgement.certificate, judgement.spread
-    far = spread.distance_m > GAP_RATIO * certificate.least_radius_m
+    spread = judgement.spread
+    far = spread.distance_m > GAP_RATIO * judgement.certificate.least_radius_m
     return Layer(
         stage=STAGE,
         name="gaps",
-        geometries=tuple(shapely.points(spread.places[far])),
-        values=tuple((spread.distance_m[far] / certificate.cover_radius_m[1]).tolist()),
+        geometries=tuple(Point(place) for place in spread.places[far]),
+        values=tuple((spread.distance_m[far] / judgement.cover.high_m).tolist()),
     )
 
 
-def _worst_gap(certificate: Certificate) -> Layer:
-    label = f"{certificate.cover_radius_m[1]:.0f} m from the path ({certificate.q:.2f} times the least possible)"
-    return Layer(
-        stage=STAGE, name="worst_gap", geometries=(Point(certificate.worst_gap),), labels=(label,), colour=RED
-    )
+def _worst_gap(judgement: Judgement) -> Layer:
+    cover, q = judgement.cover, judgement.certificate.q
+    label = f"{cover.low_m:.0f} m from the path, {q:.2f} times the least possible"
+    return Layer(stage=STAGE, name="worst_gap", geometries=(Point(cover.place),), labels=(label,), colour=RED)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,22 +34,20 @@ class DistanceSpread:
         return float(np.quantile(self.distance_m, 0.95))
 
 
-def distance_spread(region: MultiPolygon, distance: PathDistance, *, count: int = 20_000) -> DistanceSpread:
-    """Distance to a path over `region`, at `count` places or somewhat more."""
+def distance_spread(region: MultiPolygon, distance: PathDistance, *, count: int = 32_000) -> DistanceSpread:
+    """Distance to a path over `region`, at `count` places or so."""
     places = stratified_places(region, count)
     return DistanceSpread(places, distance(places))
 
 
 def stratified_places(region: MultiPolygon, count: int, *, seed: int = 0) -> FloatArray:
-    """Places (n, 2) spread over `region` by area, n at least about `count`: the same for the same arguments.
+    """Places (n, 2) spread over `region` by area, n near `count`: the same for the same arguments.
 
     One place at random in each of equal squares (stratified sampling, McKay et al. 1979): a regular grid
     would fall into step with parallel transects.
     """
     shapely.prepare(region)
-    squares = Squares.around(region)
-    while (2 * squares.half_m) ** 2 * count > region.area:
-        squares = squares.quarters().meeting(region)
+    squares = Squares.tiling(region, math.sqrt(region.area / count))
     jitter = np.random.default_rng(seed).uniform(-squares.half_m, squares.half_m, size=squares.centres.shape)
     places = squares.centres + jitter
     return np.asarray(places[shapely.contains_xy(region, places)])
