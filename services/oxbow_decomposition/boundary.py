@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import shapely
-from shapely import Polygon
+from shapely import LinearRing, Polygon
 
-from oxbow.contracts import FloatArray
+from oxbow.contracts import FloatArray, Place
 
-__all__ = ["boundary_walks"]
+__all__ = ["boundary_walks", "distinct"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,12 +23,14 @@ class _Arc:
     points: FloatArray
 
     @property
-    def tail(self) -> tuple[float, float]:
-        return tuple(self.points[0])
+    def tail(self) -> Place:
+        x, y = self.points[0].tolist()
+        return x, y
 
     @property
-    def head(self) -> tuple[float, float]:
-        return tuple(self.points[-1])
+    def head(self) -> Place:
+        x, y = self.points[-1].tolist()
+        return x, y
 
 
 def boundary_walks(polygon: Polygon) -> list[FloatArray]:
@@ -46,24 +50,35 @@ def boundary_walks(polygon: Polygon) -> list[FloatArray]:
     list of ndarray, shape (n, 2)
         The vertices of each walk; the first is not repeated at the end, no two consecutive ones are equal.
     """
-    oriented = shapely.orient_polygons(polygon, exterior_cw=False)
+    oriented = shapely.orient_polygons(polygon)
     rings = [oriented.exterior, *oriented.interiors]
-    tree = shapely.STRtree(rings)
-    left, right = tree.query(rings, predicate="intersects")
-    touching = left < right
-    pinches: dict[int, list[FloatArray]] = {}
-    for one, other in zip(left[touching].tolist(), right[touching].tolist(), strict=True):
-        places = shapely.get_coordinates(shapely.intersection(rings[one], rings[other]))
-        pinches.setdefault(one, []).extend(places)
-        pinches.setdefault(other, []).extend(places)
+    pinches = _pinches(rings)
     walks = [_vertices(ring) for number, ring in enumerate(rings) if number not in pinches]
     arcs = [arc for number, places in pinches.items() for arc in _arcs(_vertices(rings[number]), places)]
     return walks + _linked(arcs)
 
 
-def _vertices(ring: shapely.LinearRing) -> FloatArray:
-    points = shapely.get_coordinates(ring)
-    return points[1:][(np.diff(points, axis=0) != 0).any(axis=1)]
+def _pinches(rings: list[LinearRing]) -> dict[int, list[FloatArray]]:
+    """For each ring that touches others, by number: where."""
+    pinches: dict[int, list[FloatArray]] = {}
+    pairs = shapely.STRtree(rings).query(rings, predicate="intersects").T
+    for one, other in pairs[pairs[:, 0] < pairs[:, 1]].tolist():
+        places = list(shapely.get_coordinates(shapely.intersection(rings[one], rings[other])))
+        pinches.setdefault(one, []).extend(places)
+        pinches.setdefault(other, []).extend(places)
+    return pinches
+
+
+def distinct(points: FloatArray) -> FloatArray:
+    """The points, shape (n, 2), without those that equal the one before them."""
+    new = np.ones(len(points), dtype=np.bool_)
+    new[1:] = (points[1:] != points[:-1]).any(axis=1)
+    kept: FloatArray = points[new]
+    return kept
+
+
+def _vertices(ring: LinearRing) -> FloatArray:
+    return distinct(shapely.get_coordinates(ring))[:-1]
 
 
 def _arcs(ring: FloatArray, places: list[FloatArray]) -> list[_Arc]:
@@ -75,7 +90,7 @@ def _arcs(ring: FloatArray, places: list[FloatArray]) -> list[_Arc]:
     ring = np.roll(ring, -cuts[0], axis=0)
     bounds = [*(cuts - cuts[0]).tolist(), len(ring)]
     closed = np.concatenate([ring, ring[:1]])
-    return [_Arc(closed[first : last + 1]) for first, last in zip(bounds, bounds[1:], strict=False)]
+    return [_Arc(closed[first : last + 1]) for first, last in pairwise(bounds)]
 
 
 def _nearest_edge(ring: FloatArray, place: FloatArray) -> int:
@@ -85,18 +100,18 @@ def _nearest_edge(ring: FloatArray, place: FloatArray) -> int:
 
 def _linked(arcs: list[_Arc]) -> list[FloatArray]:
     """Walks over all arcs: at each pinch on to the arc that bounds the same sector of water."""
-    leaving: dict[tuple[float, float], list[_Arc]] = {}
+    leaving: dict[Place, list[_Arc]] = {}
     for arc in arcs:
         leaving.setdefault(arc.tail, []).append(arc)
-    walks, left = [], set(arcs)
-    for first in arcs:
-        walk, arc = [], first
-        while arc in left:
-            left.remove(arc)
+    ahead = {arc: min(leaving[arc.head], key=partial(_sector, arc)) for arc in arcs}
+    walks = []
+    while ahead:
+        arc = next(iter(ahead))
+        walk = []
+        while arc in ahead:
             walk.append(arc.points[:-1])
-            arc = min(leaving[arc.head], key=lambda ahead, behind=arc: _sector(behind, ahead))
-        if walk:
-            walks.append(np.concatenate(walk))
+            arc = ahead.pop(arc)
+        walks.append(np.concatenate(walk))
     return walks
 
 

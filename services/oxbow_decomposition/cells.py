@@ -22,8 +22,8 @@ def decompose(free: Polygon, heading_rad: float, scores: tuple[HeadingScore, ...
     The boustrophedon decomposition of Choset 2000, with the critical points and Reeb graph of Rendas and Li
     2016, section 1.2.1.1, step 2. It departs from both in that the sweep line stops at critical points alone
     (the chains between them are arrays that a binary search enters), and in that a shared abscissa is no
-    special case (`oxbow_decomposition.chains`): m critical points and n vertices take O(n + m log m) time and
-    searches, whatever their position.
+    special case (`oxbow_decomposition.chains`). With n vertices and m critical points it takes O(m log m) binary
+    searches, and time to copy the n vertices into the cells.
 
     Parameters
     ----------
@@ -40,15 +40,15 @@ def decompose(free: Polygon, heading_rad: float, scores: tuple[HeadingScore, ...
         Cells in the order in which they end. They tile the polygon. Those between critical points of equal u
         have no width; they keep the Reeb graph connected where the water is.
     """
+    met = extremes(boundary_walks(free), heading_rad)
     sweep = _Sweep()
-    for extreme in extremes(boundary_walks(free), heading_rad):
-        sweep.meet(extreme)
+    kinds = [sweep.meet(extreme) for extreme in met]
+    places = from_sweep([(extreme.place.u, extreme.place.v) for extreme in met], heading_rad).tolist()
     return Decomposition(
         heading_rad=heading_rad,
         cells=tuple(sweep.cells),
         critical_points=tuple(
-            CriticalPoint(kind=kind, place=tuple(from_sweep((extreme.u, extreme.v), heading_rad).tolist()))
-            for extreme, kind in sweep.met
+            CriticalPoint(kind=kind, place=(x, y)) for kind, (x, y) in zip(kinds, places, strict=True)
         ),
         scores=scores,
     )
@@ -80,27 +80,28 @@ class _Sweep:
     above: dict[Chain, _Open] = field(default_factory=dict)
     below: dict[Chain, _Open] = field(default_factory=dict)
     cells: list[Cell] = field(default_factory=list)
-    met: list[tuple[Extreme, CriticalKind]] = field(default_factory=list)
+    met: int = 0
 
-    def meet(self, extreme: Extreme) -> None:
+    def meet(self, extreme: Extreme) -> CriticalKind:
+        """Go on to the next critical point; returns its kind."""
         if extreme.minimum:
             kind = self._open(extreme) if extreme.opens else self._split(extreme)
         elif self.above[extreme.floor] is self.below[extreme.ceiling]:
             kind = self._close(extreme)
         else:
             kind = self._merge(extreme)
-        self.met.append((extreme, kind))
+        self.met += 1
+        return kind
 
     def _open(self, at: Extreme) -> CriticalKind:
-        position = bisect(self.line, at.v, key=lambda cell: cell.middle(at.u))
-        self._begin(position, at.floor, at.floor.first, at.ceiling, at.ceiling.first)
+        self._begin(self._position(at), at.floor, at.floor.first, at.ceiling, at.ceiling.first)
         return CriticalKind.OPEN
 
     def _split(self, at: Extreme) -> CriticalKind:
-        position = bisect(self.line, at.v, key=lambda cell: cell.middle(at.u))
-        nearest = self.line[max(position - 1, 0) : position + 1]
-        cell = max(nearest, key=lambda cell: cell.margin(at.u, at.v))
-        floor_at, ceiling_at = cell.floor.cut_below(at.u), cell.ceiling.cut_above(at.u)
+        u, v = at.place.u, at.place.v
+        position = self._position(at)
+        cell = max(self.line[max(position - 1, 0) : position + 1], key=lambda cell: cell.margin(u, v))
+        floor_at, ceiling_at = cell.floor.cut_below(u), cell.ceiling.cut_above(u)
         position = self._end(cell, floor_at, ceiling_at)
         self._begin(position, cell.floor, floor_at, at.ceiling, at.ceiling.first)
         self._begin(position + 1, at.floor, at.floor.first, cell.ceiling, ceiling_at)
@@ -112,14 +113,18 @@ class _Sweep:
 
     def _merge(self, at: Extreme) -> CriticalKind:
         lower, upper = self.below[at.ceiling], self.above[at.floor]
-        floor_at, ceiling_at = lower.floor.cut_below(at.u), upper.ceiling.cut_above(at.u)
+        floor_at, ceiling_at = lower.floor.cut_below(at.place.u), upper.ceiling.cut_above(at.place.u)
         self._end(upper, at.floor.last, ceiling_at)
         position = self._end(lower, floor_at, at.ceiling.last)
         self._begin(position, lower.floor, floor_at, upper.ceiling, ceiling_at)
         return CriticalKind.MERGE
 
+    def _position(self, at: Extreme) -> int:
+        """How many open cells have their middle below a vertex (or level with it)."""
+        return bisect(self.line, at.place.v, key=lambda cell: cell.middle(at.place.u))
+
     def _begin(self, position: int, floor: Chain, floor_at: Mark, ceiling: Chain, ceiling_at: Mark) -> None:
-        cell = _Open(floor, ceiling, floor_at, ceiling_at, start=len(self.met))
+        cell = _Open(floor, ceiling, floor_at, ceiling_at, start=self.met)
         self.line.insert(position, cell)
         self.above[floor] = self.below[ceiling] = cell
 
@@ -130,7 +135,7 @@ class _Sweep:
         # An upright shore at the very start of a floor or end of a ceiling faces the neighbour's water.
         floor = floor[np.searchsorted(floor[:, 0], floor[0, 0], side="right") - 1 :]
         ceiling = ceiling[: np.searchsorted(ceiling[:, 0], ceiling[-1, 0]) + 1]
-        self.cells.append(Cell(floor=floor, ceiling=ceiling, start=cell.start, end=len(self.met)))
+        self.cells.append(Cell(floor=floor, ceiling=ceiling, start=cell.start, end=self.met))
         position = self.line.index(cell)
         del self.line[position]
         return position

@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
+import numpy.typing as npt
 
 from oxbow.contracts import FloatArray
 from oxbow.sweep import to_sweep
+from oxbow_decomposition.boundary import distinct
 
 __all__ = ["Chain", "Extreme", "Mark", "extremes"]
 
@@ -31,11 +33,11 @@ TURN_ERROR = 4.0 * 2.0**-53
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A place on a chain: at (u, v), with the vertices from `index` on after it."""
+    """A place (u, v) on a chain, with the vertices from `index` on after it."""
 
-    index: int
     u: float
     v: float
+    index: int
 
 
 class Chain:
@@ -49,11 +51,13 @@ class Chain:
 
     @property
     def first(self) -> Mark:
-        return Mark(0, *self.points[0].tolist())
+        u, v = self.points[0].tolist()
+        return Mark(u, v, 0)
 
     @property
     def last(self) -> Mark:
-        return Mark(len(self.points) - 1, *self.points[-1].tolist())
+        u, v = self.points[-1].tolist()
+        return Mark(u, v, len(self.points) - 1)
 
     def cut_below(self, u: float) -> Mark:
         """Where a chain below a vertex at `u` is cut: an upright edge at `u` comes before the cut."""
@@ -67,7 +71,7 @@ class Chain:
         u0, v0 = self.points[max(index - 1, 0)].tolist()
         u1, v1 = self.points[min(index, len(self.points) - 1)].tolist()
         share = (u - u0) / (u1 - u0) if u0 < u < u1 else float(u >= u1)
-        return Mark(index, u, v0 * (1.0 - share) + v1 * share)
+        return Mark(u, v0 * (1.0 - share) + v1 * share, index)
 
     def between(self, start: Mark, end: Mark) -> FloatArray:
         """The part of the chain from one mark to another, shape (n, 2), without repeated points."""
@@ -83,8 +87,7 @@ class Extreme:
     between the two (an open), not around them (a split); what a maximum does shows in the sweep.
     """
 
-    u: float
-    v: float
+    place: Mark
     floor: Chain
     ceiling: Chain
     minimum: bool
@@ -95,7 +98,7 @@ class Extreme:
         """Lexicographic; at one place ends, then splits, then opens from the lowest upwards."""
         (u0, v0), (u1, v1) = self.floor.points[:2].tolist()
         slope = math.atan2(v1 - v0, u1 - u0) if self.opens else 0.0
-        return self.u, self.v, self.minimum, self.opens, slope
+        return self.place.u, self.place.v, self.minimum, self.opens, slope
 
 
 def extremes(walks: list[FloatArray], heading_rad: float) -> list[Extreme]:
@@ -118,40 +121,42 @@ def extremes(walks: list[FloatArray], heading_rad: float) -> list[Extreme]:
     return sorted(found, key=lambda extreme: extreme.order)
 
 
-def distinct(points: FloatArray) -> FloatArray:
-    """The points, shape (n, 2), without those that equal the one before them."""
-    return points[np.append(True, (np.diff(points, axis=0) != 0).any(axis=1))]
-
-
 def _of_walk(planar: FloatArray, heading_rad: float, grid: float) -> Iterator[Extreme]:
     walk = to_sweep(planar, heading_rad)
     walk[:, 0] = np.round(walk[:, 0] / grid) * grid
-    ahead = np.roll(walk, -1, axis=0)
-    rising = (walk[:, 0] < ahead[:, 0]) | ((walk[:, 0] == ahead[:, 0]) & (walk[:, 1] < ahead[:, 1]))
-    first = int(np.argmax(rising & ~np.roll(rising, 1)))
-    planar, walk, rising = (np.roll(array, -first, axis=0) for array in (planar, walk, rising))
+    rising = _rising(walk)
+    first = -int(np.argmax(rising & ~np.roll(rising, 1)))
+    planar, walk, rising = np.roll(planar, first, axis=0), np.roll(walk, first, axis=0), np.roll(rising, first)
     minima = np.flatnonzero(rising & ~np.roll(rising, 1))
     maxima = np.flatnonzero(~rising & np.roll(rising, 1))
-    closed = np.concatenate([walk, walk[:1]])
-    ends = [*minima[1:].tolist(), len(walk)]
-    floors = [Chain(closed[low : high + 1]) for low, high in zip(minima.tolist(), maxima.tolist(), strict=True)]
-    ceilings = [Chain(closed[high : low + 1][::-1]) for high, low in zip(maxima.tolist(), ends, strict=True)]
     turns = _turns(walk, minima)
     turns = np.where(turns == 0, _turns(planar, minima), turns)
-    for number, (low, high) in enumerate(zip(minima, maxima, strict=True)):
-        before, floor, ceiling = ceilings[number - 1], floors[number], ceilings[number]
-        yield Extreme(*walk[low].tolist(), floor=floor, ceiling=before, minimum=True, opens=turns[number] > 0)
-        yield Extreme(*walk[high].tolist(), floor=floor, ceiling=ceiling, minimum=False, opens=False)
+
+    closed = np.concatenate([walk, walk[:1]])
+    lows, highs = [*minima.tolist(), len(walk)], maxima.tolist()
+    floors = [Chain(closed[low : high + 1]) for low, high in zip(lows[:-1], highs, strict=True)]
+    ceilings = [Chain(closed[high : low + 1][::-1]) for high, low in zip(highs, lows[1:], strict=True)]
+    for floor, ceiling, turn in zip(floors, [ceilings[-1], *ceilings[:-1]], turns.tolist(), strict=True):
+        yield Extreme(place=floor.first, floor=floor, ceiling=ceiling, minimum=True, opens=turn > 0)
+    for floor, ceiling in zip(floors, ceilings, strict=True):
+        yield Extreme(place=floor.last, floor=floor, ceiling=ceiling, minimum=False, opens=False)
 
 
-def _turns(walk: FloatArray, corners: np.ndarray) -> FloatArray:
-    """Sign of the turn of a walk at some of its vertices: positive to the left; exact."""
+def _rising(walk: FloatArray) -> npt.NDArray[np.bool_]:
+    """Whether each vertex is followed by one of higher lexicographic order."""
+    (u, v), (next_u, next_v) = walk.T, np.roll(walk, -1, axis=0).T
+    rising: npt.NDArray[np.bool_] = (u < next_u) | ((u == next_u) & (v < next_v))
+    return rising
+
+
+def _turns(walk: FloatArray, corners: npt.NDArray[np.intp]) -> FloatArray:
+    """Turn of a walk at some of its vertices: positive to the left, and of the exact sign."""
     corner = walk[corners]
     behind, ahead = walk[corners - 1], walk[(corners + 1) % len(walk)]
     (x0, y0), (x1, y1) = (corner - behind).T, (ahead - corner).T
-    turns = x0 * y1 - y0 * x1
+    turns: FloatArray = x0 * y1 - y0 * x1
     doubtful = np.abs(turns) <= TURN_ERROR * (np.abs(x0 * y1) + np.abs(y0 * x1))
     for number in np.flatnonzero(doubtful):
         (ax, ay), (bx, by), (cx, cy) = (map(Fraction, p[number].tolist()) for p in (behind, corner, ahead))
         turns[number] = float((bx - ax) * (cy - by) - (by - ay) * (cx - bx))
-    return np.sign(turns)
+    return turns
