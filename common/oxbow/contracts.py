@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from shapely import LineString, Polygon
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import ErrorReply, InvalidMission
 
 __all__ = [
     "CERTIFY",
@@ -39,8 +39,12 @@ __all__ = [
     "FloatArray",
     "FreeSpace",
     "HeadingScore",
+    "Measures",
     "Message",
     "Method",
+    "MissionKey",
+    "MissionState",
+    "MissionStatus",
     "PathPlan",
     "PathRequest",
     "Place",
@@ -261,10 +265,12 @@ class CertifyRequest(Message, frozen=True, kw_only=True):
         require_finite(self, "safety_m", least=0.0)
         require_finite(self, "speed_mps", above=0.0)
         if not (0 < self.path.length < math.inf):
-            raise InvalidMission(f"is {self.path.length!r} m long; expected a path of finite length > 0", where="path")
+            raise InvalidMission(
+                f"is {self.path.length!r} m long; expected a path of finite length > 0", where="path"
+            )
 
 
-class Certificate(Message, frozen=True, kw_only=True):
+class Measures(Message, frozen=True, kw_only=True):
     """How good a path is against what is possible; the measures are defined in `docs/quality.md`.
 
     `cover_radius_m` are certified (low, high) bounds of the largest distance from a point of the free space to
@@ -288,13 +294,66 @@ class Certificate(Message, frozen=True, kw_only=True):
     p95_distance_m: float
     mean_ratio: float
     p95_ratio: float
+
+
+class Certificate(Measures, frozen=True, kw_only=True):
+    """The measures of a path, and the place of the free space that is farthest from it."""
+
     worst_gap: Place | None = None
+
+
+# --------------------------------------------------------------------------- DSS and guidance (JSON)
+
+DEFAULT_DEADLINE_S = 120.0
+"""Seconds that planning one mission may take, its wait for a free planner not counted."""
+
+
+class MissionState(enum.StrEnum):
+    """How far a mission's revision has come; `DONE` and `FAILED` are final."""
+
+    ACCEPTED = "accepted"
+    PLANNING = "planning"
+    DONE = "done"
+    FAILED = "failed"
+
+    @property
+    def is_final(self) -> bool:
+        return self in (MissionState.DONE, MissionState.FAILED)
+
+
+class MissionStatus(Message, frozen=True, kw_only=True):
+    """Where a mission stands.
+
+    Parameters
+    ----------
+    mission_id, revision
+        Which request it is about: every new content under one id is a new revision, counted from 1. A request
+        whose id cannot be kept has revision 0.
+    state
+        Accepted requests are on disk: each of them ends `done` or `failed`, whatever crashes.
+    stage
+        The stage at work while `planning`.
+    fraction
+        The share of the stages that are done, 0 to 1.
+    error
+        Why it `failed`.
+    time_s
+        Unix time of this state.
+    """
+
+    mission_id: str
+    revision: int
+    state: MissionState
+    stage: str = ""
+    fraction: float = 0.0
+    error: ErrorReply | None = None
+    time_s: float
 
 
 # --------------------------------------------------------------------------- endpoints and keys
 
 PREFIX = "oxbow/v1"
-MAX_REQUEST_BYTES = 64 * 2**20
+MAX_REQUEST_BYTES = 128 * 2**20
 _ID = re.compile(r"[A-Za-z0-9_.-]+")
 
 
@@ -317,9 +376,13 @@ class Endpoint(Generic[Q, R]):
         """Where one replica of the stage takes queries."""
         return f"{PREFIX}/stage/{self.stage}/{checked_id(instance)}"
 
+    def introspection_key(self, instance: str, what: str) -> str:
+        """Where one replica tells about itself; `what` is one of `INTROSPECTION`."""
+        return f"{self.instance_key(instance)}/@{what}"
+
     def live_key(self, instance: str) -> str:
-        """The liveliness token of one replica; ``*`` in place of an instance matches all."""
-        return f"{PREFIX}/live/{self.stage}/{instance}"
+        """The liveliness token of one replica."""
+        return live_key(self.stage, instance)
 
 
 CONTOUR: Endpoint[ContourRequest, FreeSpace] = Endpoint("contour", ContourRequest, FreeSpace)
@@ -330,15 +393,82 @@ CERTIFY: Endpoint[CertifyRequest, Certificate] = Endpoint("certificate", Certify
 STAGES: tuple[Endpoint[Any, Any], ...] = (CONTOUR, DECOMPOSE, PATH, CERTIFY)
 
 
+INTROSPECTION = ("ping", "info", "stats", "schema")
+ANY_LIVE = f"{PREFIX}/live/*/*"
+
+
+def live_key(service: str, instance: str) -> str:
+    """The liveliness token of one process of a service; stages and other services alike."""
+    return f"{PREFIX}/live/{checked_id(service)}/{checked_id(instance)}"
+
+
+def live_service(key: str) -> tuple[str, str]:
+    """The service and the instance of a liveliness token's key."""
+    service, instance = key.removeprefix(f"{PREFIX}/live/").split("/")
+    return service, instance
+
+
+def any_introspection_key(what: str) -> str:
+    """Asks every replica of every stage; `what` is one of `INTROSPECTION`."""
+    return f"{PREFIX}/stage/*/*/@{what}"
+
+
+ANY = "*"
+"""In place of one chunk of a key, matches all."""
+
+
+@dataclass(frozen=True)
+class MissionKey:
+    """``oxbow/v1/mission/{id}/{what}``, or ``.../{what}/{revision}`` for the history of plans and replans.
+
+    Parameters
+    ----------
+    mission_id
+        One mission, or `ANY`.
+    what
+        ``request``, ``status``, ``plan``, ``report`` or ``replan``.
+    revision
+        One revision, `ANY`, or None for the latest.
+    """
+
+    mission_id: str
+    what: str
+    revision: int | str | None = None
+
+    def __str__(self) -> str:
+        key = f"{PREFIX}/mission/{self.mission_id}/{self.what}"
+        return key if self.revision is None else f"{key}/{self.revision}"
+
+    @classmethod
+    def parse(cls, key: str) -> MissionKey:
+        """Take a key apart; the id is as it came, fit for a reply or not."""
+        match = _MISSION_KEY.fullmatch(key)
+        if match is None:
+            expected = f"{PREFIX}/mission/{{id}}/{{what}}[/{{revision}}], each one name, number or {ANY}"
+            raise InvalidMission(f"is {key!r}; expected {expected}", where="key")
+        mission_id, what, revision = match.groups()
+        return cls(mission_id, what, int(revision) if revision and revision != ANY else revision)
+
+
+_MISSION_KEY = re.compile(rf"{PREFIX}/mission/([^/]+)/([a-z]+)(?:/([0-9]{{1,9}}|\*))?")
+
+
 def mission_key(mission_id: str, what: str) -> str:
-    """``oxbow/v1/mission/{id}/{what}``; `what` is request, status, plan, report or replan."""
-    return f"{PREFIX}/mission/{checked_id(mission_id)}/{what}"
+    """The key of one mission; ``oxbow/v1/mission/{id}/{what}``."""
+    return str(MissionKey(checked_id(mission_id), what))
 
 
 PLAN_KEY = f"{PREFIX}/plan"
-ANY_MISSION_REQUEST = f"{PREFIX}/mission/*/request"
 
 
 def layer_key(mission_id: str, stage: str, name: str) -> str:
     """Where a stage's layer of one mission is put."""
     return f"{PREFIX}/layer/{checked_id(mission_id)}/{checked_id(stage)}/{checked_id(name)}"
+
+
+ANY_LAYER = f"{PREFIX}/layer/*/*/*"
+
+
+def any_layer_key(stage: str) -> str:
+    """Every layer that a stage shows, of any mission."""
+    return f"{PREFIX}/layer/*/{checked_id(stage)}/*"

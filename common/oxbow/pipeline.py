@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol, TypeVar
 
+from oxbow.completion import completed
 from oxbow.contracts import (
     CERTIFY,
     CONTOUR,
@@ -16,7 +17,7 @@ from oxbow.contracts import (
     Message,
     PathRequest,
 )
-from oxbow.mission import Mission, PlanOptions, completed
+from oxbow.mission import Mission, PlanOptions, require_plannable
 from oxbow.site import Site
 
 __all__ = ["Call", "plan_mission"]
@@ -54,6 +55,7 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
         Whatever a stage raised: nothing is planned by half.
     """
     options = options or PlanOptions()
+    require_plannable(mission)
     site = Site.of(mission)
     space = call(
         CONTOUR,
@@ -78,7 +80,7 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
             launch=site.launch,
             recovery=site.recovery,
             length_m=mission.master_length_m,
-            min_spacing_m=mission.minimal_spatial_rate_m,
+            min_spacing_m=mission.minimal_spatial_rate_m or 0.0,
             seed=options.seed,
         ),
     )

@@ -1,0 +1,251 @@
+"""The Mission File: its fields, their defaults and checks (Rendas and Li 2016, section 1.1).
+
+The JSON names are the report's; the Python names carry SI units. `docs/mission-file.md` describes the file.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from oxbow.contracts import MAX_REQUEST_BYTES
+from oxbow.errors import InvalidMission
+from oxbow.files import read_bytes, write_atomically
+from oxbow.frame import Position, lonlat
+from oxbow.plan import PlanOptions, PlanRecord
+from oxbow.strict_json import decode_json
+
+__all__ = [
+    "Bloom",
+    "Mission",
+    "MissionType",
+    "OutlineName",
+    "PlanOptions",
+    "PlanRecord",
+    "Position",
+    "mission_json",
+    "parse_mission",
+    "read_mission",
+    "require_plannable",
+    "write_mission",
+]
+
+
+class MissionType(enum.StrEnum):
+    """What a mission is for, and so which vehicles take part."""
+
+    MAP = "map"
+    ADAP = "adap"
+    TREAT = "treat"
+    MAP_AND_TREAT = "map&treat"
+    ADAP_AND_TREAT = "adap&treat"
+
+
+NEEDS_BLOOM = frozenset({MissionType.ADAP, MissionType.MAP_AND_TREAT, MissionType.ADAP_AND_TREAT})
+PLANNABLE = (MissionType.MAP, MissionType.ADAP)
+
+
+class Bloom(msgspec.Struct, frozen=True, kw_only=True, rename={"sensor": "Sensor", "value": "Value"}):
+    """What to look for or treat: water where `sensor` reads more than `value`, in the sensor's own unit."""
+
+    sensor: str
+    value: float
+    extra: dict[str, Any] = {}
+
+
+_JSON_NAMES = {
+    "mission_type": "MissionType",
+    "site_name": "SiteName",
+    "launch": "LaunchPoint",
+    "recovery": "RecoveryPoint",
+    "outline": "BoundingBox",
+    "forbidden_zones": "ForbiddenZones",
+    "bloom": "Bloom",
+    "master_speed_mps": "Master_speed",
+    "slave_speed_mps": "Slave_speed",
+    "master_length_m": "Master_length",
+    "slave_length_m": "Slave_length",
+    "safety_m": "Safety",
+    "minimal_spatial_rate_m": "Minimal_spatial_rate",
+    "master_path": "Master_Path",
+    "slave_path": "Slave_Path",
+    "plan": "Plan",
+}
+_POSITIVE = (
+    "master_speed_mps",
+    "slave_speed_mps",
+    "master_length_m",
+    "slave_length_m",
+    "minimal_spatial_rate_m",
+)
+
+
+_BLOOM_NAMES = frozenset({"Sensor", "Value"})
+
+
+class OutlineName(enum.StrEnum):
+    """The names that the outline's field may have; `IN_BOX` is the older one."""
+
+    BOUNDING_BOX = "BoundingBox"
+    IN_BOX = "InBox"
+
+
+class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
+    """A Mission File whose values are in range; `oxbow.site.Site` checks its geometry.
+
+    Parameters
+    ----------
+    recovery
+        Where the vehicle comes back; the launch point where absent.
+    outline
+        The water's contour, at least three distinct points, either orientation, closed or not.
+    outline_name
+        The name under which the outline came, and is written.
+    safety_m
+        Least distance from the outline and the zones.
+    minimal_spatial_rate_m
+        Least distance between parallel segments of the path; absent: as close as the length allows.
+    extra
+        Fields without a meaning here, kept as they came.
+    """
+
+    mission_type: MissionType
+    site_name: str | None = None
+    launch: Position
+    recovery: Position | None = None
+    outline: tuple[Position, ...]
+    forbidden_zones: tuple[tuple[Position, ...], ...] = ()
+    bloom: Bloom | None = None
+    master_speed_mps: float = 1.0
+    slave_speed_mps: float = 0.5
+    master_length_m: float = 20_000.0
+    slave_length_m: float = 15_000.0
+    safety_m: float = 0.0
+    minimal_spatial_rate_m: float | None = None
+    master_path: tuple[Position, ...] | None = None
+    slave_path: tuple[Position, ...] | None = None
+    plan: PlanRecord | None = None
+    outline_name: OutlineName = OutlineName.BOUNDING_BOX
+    extra: dict[str, Any] = {}
+
+    def __post_init__(self) -> None:
+        for field in _POSITIVE:
+            value = getattr(self, field)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise InvalidMission(f"is {value!r}; expected a finite number > 0", where=_JSON_NAMES[field])
+        if not (math.isfinite(self.safety_m) and self.safety_m >= 0):
+            raise InvalidMission(f"is {self.safety_m!r}; expected a finite number >= 0", where="Safety")
+        if self.bloom is None and self.mission_type in NEEDS_BLOOM:
+            raise InvalidMission(
+                f"is missing; a mission of type {self.mission_type} needs its Sensor and Value", where="Bloom"
+            )
+        if self.bloom is not None and not math.isfinite(self.bloom.value):
+            raise InvalidMission(f"is {self.bloom.value!r}; expected a finite number", where="Bloom.Value")
+        if clash := FIELD_NAMES & self.extra.keys():
+            raise InvalidMission("is a field of the Mission File, not an extra one", where=min(clash))
+        self._check_positions()
+
+    def _check_positions(self) -> None:
+        _require_degrees("LaunchPoint", (self.launch,), indexed=False)
+        if self.recovery is not None:
+            _require_degrees("RecoveryPoint", (self.recovery,), indexed=False)
+        _require_degrees(self.outline_name, self.outline)
+        for index, zone in enumerate(self.forbidden_zones):
+            _require_degrees(f"ForbiddenZones[{index}]", zone)
+        _require_degrees("Master_Path", self.master_path or ())
+        _require_degrees("Slave_Path", self.slave_path or ())
+
+
+FIELD_NAMES = frozenset(_JSON_NAMES.values()) | {name.value for name in OutlineName}
+"""Every field of the Mission File that has a meaning here."""
+
+
+def _require_degrees(name: str, positions: Sequence[Position], *, indexed: bool = True) -> None:
+    degrees = lonlat(positions)
+    wrong = ~((np.abs(degrees[:, 1]) <= 90.0) & (np.abs(degrees[:, 0]) <= 360.0))
+    if not wrong.any():
+        return
+    index = int(np.argmax(wrong))
+    position = positions[index]
+    where = f"{name}[{index}]" if indexed else name
+    if abs(position.lat) <= 90.0:
+        raise InvalidMission(f"is {position.long!r}; expected -180 .. 180 degrees", where=f"{where}.long")
+    swapped = " (latitude and longitude look swapped)" if abs(position.long) <= 90.0 else ""
+    raise InvalidMission(f"is {position.lat!r}; expected -90 .. 90 degrees{swapped}", where=f"{where}.lat")
+
+
+def require_plannable(mission: Mission) -> None:
+    """Raise `InvalidMission` where the mission's type is one that cannot be planned by now."""
+    if mission.mission_type not in PLANNABLE:
+        raise InvalidMission(
+            f"is {mission.mission_type.value!r}; only {' and '.join(PLANNABLE)} missions can be planned by now",
+            where="MissionType",
+        )
+
+
+# --------------------------------------------------------------------------- the file
+
+
+def parse_mission(data: bytes) -> Mission:
+    """The mission that a Mission File holds.
+
+    Raises
+    ------
+    InvalidMission
+        The bytes are more than `MAX_REQUEST_BYTES`, are not JSON, or break a rule of the Mission File; the
+        error names the field with its index, and its value.
+    """
+    if len(data) > MAX_REQUEST_BYTES:
+        raise InvalidMission(f"is {len(data)} bytes; expected at most {MAX_REQUEST_BYTES}", where="Mission File")
+    document = _gathered(decode_json(data, dict[str, msgspec.Raw], "Mission File"), FIELD_NAMES)
+    names = [name for name in OutlineName if name in document]
+    if len(names) > 1:
+        raise InvalidMission("is given beside BoundingBox, its newer name; expected one of them", where="InBox")
+    if "Bloom" in document and bytes(document["Bloom"]).startswith(b"{"):
+        bloom = _gathered(decode_json(bytes(document["Bloom"]), dict[str, msgspec.Raw], "Bloom"), _BLOOM_NAMES)
+        document["Bloom"] = msgspec.Raw(msgspec.json.encode(bloom))
+    if names:
+        document["BoundingBox"] = document.pop(names[0])
+        document["outline_name"] = msgspec.Raw(msgspec.json.encode(names[0]))
+    try:
+        return decode_json(msgspec.json.encode(document), Mission, "Mission File")
+    except InvalidMission as error:
+        if names == [OutlineName.IN_BOX] and error.where.startswith("BoundingBox"):
+            raise InvalidMission(error.message, error.where.replace("BoundingBox", "InBox", 1)) from error
+        raise
+
+
+def _gathered(document: dict[str, msgspec.Raw], known: frozenset[str]) -> dict[str, msgspec.Raw]:
+    """The known fields of a JSON object, less those that are null, and all others together under `extra`."""
+    fields = {name: raw for name, raw in document.items() if name in known and bytes(raw) != b"null"}
+    extra = {name: raw for name, raw in document.items() if name not in known}
+    return fields | {"extra": msgspec.Raw(msgspec.json.encode(extra))}
+
+
+def mission_json(mission: Mission) -> bytes:
+    """The Mission File of a mission: the input fields, the unknown ones, and last the paths and the plan."""
+    given = {json: getattr(mission, field) for field, json in _JSON_NAMES.items()}
+    outputs = {name: given.pop(name) for name in ("Master_Path", "Slave_Path", "Plan")}
+    outline = given.pop("BoundingBox")
+    if mission.bloom is not None:
+        bloom = mission.bloom
+        given["Bloom"] = {"Sensor": bloom.sensor, "Value": bloom.value} | bloom.extra
+    document = given | {mission.outline_name.value: outline} | mission.extra | outputs
+    present = {name: value for name, value in document.items() if value is not None or name in mission.extra}
+    return msgspec.json.format(msgspec.json.encode(present), indent=2) + b"\n"
+
+
+def read_mission(path: Path | str) -> Mission:
+    """The mission in a file; `InvalidMission` where the file cannot be read or is no Mission File."""
+    return parse_mission(read_bytes(Path(path), MAX_REQUEST_BYTES))
+
+
+def write_mission(path: Path | str, mission: Mission) -> None:
+    """Replace a Mission File as a whole; on any failure the old one stays as it was (`write_atomically`)."""
+    write_atomically(Path(path), mission_json(mission))

@@ -1,0 +1,57 @@
+"""What a plan is asked for and what is recorded of it: the options, and the `Plan` object of a Mission File."""
+
+from __future__ import annotations
+
+from oxbow.contracts import Measures, Message, Method, require_finite
+from oxbow.frame import Position
+
+__all__ = ["DroppedWater", "PlanCertificate", "PlanOptions", "PlanRecord"]
+
+
+class PlanOptions(Message, frozen=True, kw_only=True):
+    """How to plan, beside what the Mission File says; a heading or tolerance left out is chosen by the planner."""
+
+    method: Method = Method.TRANSECT
+    seed: int = 0
+    heading_rad: float | None = None
+    tolerance_m: float | None = None
+
+    def __post_init__(self) -> None:
+        require_finite(self, "heading_rad")
+        require_finite(self, "seed", "tolerance_m", least=0.0)
+
+
+class PlanCertificate(Measures, frozen=True, kw_only=True):
+    """The certificate as the Mission File keeps it: the worst gap in degrees."""
+
+    worst_gap: Position | None = None
+
+
+class DroppedWater(Message, frozen=True, kw_only=True):
+    """Water that the plan leaves out, why, and a place in it."""
+
+    area_m2: float
+    reason: str
+    place: Position
+
+
+class PlanRecord(Message, frozen=True, kw_only=True):
+    """The `Plan` object of a completed Mission File: how the path was made and how good it is.
+
+    Transects run along `heading_deg` (clockwise from north). `length_m` is the geodesic length of the
+    waypoints as written. The same mission, options and versions give the same plan.
+    """
+
+    method: Method
+    seed: int
+    heading_deg: float
+    spacing_m: float
+    length_m: float
+    max_length_m: float
+    duration_s: float
+    tolerance_m: float
+    compression: float
+    certificate: PlanCertificate
+    versions: dict[str, str]
+    warnings: tuple[str, ...] = ()
+    dropped: tuple[DroppedWater, ...] = ()

@@ -1,0 +1,189 @@
+"""The site of a mission in planar metres, its geometry checked once, at the edge."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely import LineString, Point, Polygon
+
+from oxbow.contracts import FloatArray, Place
+from oxbow.errors import Infeasible, InvalidMission
+from oxbow.frame import Frame, Position, lonlat
+from oxbow.mission import Mission
+
+__all__ = ["Site"]
+
+MAX_RADIUS_M = 300_000.0
+"""How far a site may reach from the mean of its contour's points, and a launch point may lie from the water."""
+LEAST_WIDTH_M = 1e-3
+"""Points that lie in a strip narrower than this lie on one line."""
+
+
+@dataclass(frozen=True)
+class Site:
+    """Where a mission takes place, in the planar metres of its `frame`.
+
+    Parameters
+    ----------
+    outline
+        The water's contour: valid, without holes, in normal form, so that the same contour gives the same
+        site whatever its orientation, first point and repeated points.
+    zones
+        The forbidden zones that meet the outline; they may overlap one another and cross the outline.
+    launch, recovery
+        The path's ends.
+    nominal_spacing_m
+        Water area / greatest length (Rendas and Li 2016, section 1.2.1.1, step 5), or the mission's least
+        spacing where that is more.
+    warnings
+        What the mission's author should know.
+    """
+
+    frame: Frame
+    outline: Polygon
+    zones: tuple[Polygon, ...]
+    launch: Place
+    recovery: Place
+    nominal_spacing_m: float
+    warnings: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, mission: Mission) -> Site:
+        """Check a mission's geometry and bring it to planar metres.
+
+        Raises
+        ------
+        InvalidMission
+            A contour has no area, the outline meets itself or reaches farther than 300 km from its mean
+            point, or a point lies farther than that from the water; the error names field, index and value.
+        Infeasible
+            The forbidden zones cover all of the water.
+        """
+        contour = _Contour.of(mission.outline_name, mission.outline)
+        frame = Frame.around(contour.degrees)
+        outline = _outline(contour, frame)
+        zones, warnings = _zones(mission, frame, outline)
+        water = outline.difference(shapely.union_all(zones)) if zones else outline
+        if water.area == 0.0:
+            raise Infeasible("cover all of the water; nothing is left to plan on", where="ForbiddenZones")
+        return cls(
+            frame=frame,
+            outline=outline,
+            zones=zones,
+            launch=_place("LaunchPoint", mission.launch, frame, outline),
+            recovery=_place("RecoveryPoint", mission.recovery or mission.launch, frame, outline),
+            nominal_spacing_m=max(water.area / mission.master_length_m, mission.minimal_spatial_rate_m or 0.0),
+            warnings=warnings,
+        )
+
+
+@dataclass(frozen=True)
+class _Contour:
+    """A contour without its repeated points: `indices` tell where in the Mission File each point stands."""
+
+    name: str
+    degrees: FloatArray
+    indices: np.ndarray[tuple[int], np.dtype[np.intp]]
+
+    @classmethod
+    def of(cls, name: str, positions: Sequence[Position]) -> _Contour:
+        degrees = lonlat(positions)
+        indices = np.flatnonzero((degrees != np.roll(degrees, 1, axis=0)).any(axis=1))
+        if len(indices) < 3:
+            raise _too_few(name, degrees)
+        return cls(name, degrees[indices], indices)
+
+    def planar(self, frame: Frame) -> Polygon:
+        """The contour as a polygon that has an area; it may meet itself."""
+        xy = frame.to_planar(self.degrees)
+        if not np.isfinite(xy).all():
+            raise InvalidMission("reaches to the other side of the Earth", where=self.name)
+        hull = shapely.convex_hull(LineString(xy))
+        if hull.area < LEAST_WIDTH_M * hull.length:
+            if len(np.unique(self.degrees, axis=0)) < 3:
+                raise _too_few(self.name, self.degrees)
+            raise InvalidMission(
+                "has all its points on one line; expected a contour with an area", where=self.name
+            )
+        return Polygon(xy)
+
+
+def _too_few(name: str, degrees: FloatArray) -> InvalidMission:
+    distinct = len(np.unique(degrees, axis=0))
+    return InvalidMission(f"has {distinct} distinct points; expected at least 3", where=name)
+
+
+def _outline(contour: _Contour, frame: Frame) -> Polygon:
+    polygon = contour.planar(frame)
+    radius_m = np.hypot(*shapely.get_coordinates(polygon).T)
+    if radius_m.max() > MAX_RADIUS_M:
+        farthest = int(np.argmax(radius_m[:-1]))
+        raise InvalidMission(
+            f"is {radius_m.max() / 1000:.0f} km from the mean of the points;"
+            f" expected a site that reaches at most {MAX_RADIUS_M / 1000:.0f} km from there",
+            where=f"{contour.name}[{contour.indices[farthest]}]",
+        )
+    if not polygon.is_valid:
+        raise _crossing(contour, frame, polygon)
+    return shapely.normalize(polygon)
+
+
+def _crossing(contour: _Contour, frame: Frame, polygon: Polygon) -> InvalidMission:
+    """Where an outline meets itself, and which of its edges do."""
+    x, y = map(float, re.findall(r"\[(\S+) (\S+)\]", shapely.is_valid_reason(polygon))[0])
+    xy = shapely.get_coordinates(polygon)
+    distance = shapely.distance(shapely.linestrings(np.stack([xy[:-1], xy[1:]], axis=1)), Point(x, y))
+    edges = np.sort(np.argsort(distance, kind="stable")[:2])
+    following = np.roll(contour.indices, -1)
+    one, other = (f"the edge from point {contour.indices[edge]} to {following[edge]}" for edge in edges)
+    long, lat = frame.to_degrees(np.array([[x, y]]))[0]
+    return InvalidMission(
+        f"meets itself at lat {lat:.7f}, long {long:.7f}, where {one} meets {other};"
+        " expected a contour that neither crosses nor touches itself",
+        where=f"{contour.name}[{contour.indices[edges[0]]}]",
+    )
+
+
+def _zones(mission: Mission, frame: Frame, outline: Polygon) -> tuple[tuple[Polygon, ...], tuple[str, ...]]:
+    zones: list[Polygon] = []
+    warnings: list[str] = []
+    shapely.prepare(outline)
+    for index, positions in enumerate(mission.forbidden_zones):
+        name = f"ForbiddenZones[{index}]"
+        zone = _Contour.of(name, positions).planar(frame)
+        parts = [zone] if zone.is_valid else _enclosed(zone)
+        if not zone.is_valid:
+            warnings.append(f"{name} meets itself: all that it encloses is forbidden")
+        if not shapely.intersects(outline, parts).any():
+            warnings.append(f"{name} lies outside {mission.outline_name}: it changes nothing")
+            continue
+        zones += parts
+    return tuple(zones), tuple(warnings)
+
+
+def _enclosed(zone: Polygon) -> list[Polygon]:
+    """All that a contour which meets itself encloses: whichever way it was meant, nothing of it is entered."""
+    faces = shapely.polygonize([shapely.node(zone.exterior)])
+    return [Polygon(part.exterior) for part in shapely.get_parts(shapely.union_all(shapely.get_parts(faces)))]
+
+
+def _place(name: str, position: Position, frame: Frame, outline: Polygon) -> Place:
+    degrees = lonlat([position])
+    x, y = map(float, frame.to_planar(degrees)[0])
+    if _is_near(degrees, frame, outline):
+        return x, y
+    swapped = " (latitude and longitude look swapped)" if _is_near(degrees[:, ::-1], frame, outline) else ""
+    raise InvalidMission(
+        f"is lat {position.lat!r}, long {position.long!r}, {np.hypot(x, y) / 1000:.0f} km from the middle of the"
+        f" site; expected a place within {MAX_RADIUS_M / 1000:.0f} km of the water{swapped}",
+        where=name,
+    )
+
+
+def _is_near(degrees: FloatArray, frame: Frame, outline: Polygon) -> bool:
+    xy = frame.to_planar(degrees)
+    return bool(np.isfinite(xy).all()) and bool(shapely.distance(outline, Point(xy[0])) <= MAX_RADIUS_M)
