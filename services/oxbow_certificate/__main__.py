@@ -1,8 +1,6 @@
-"""Serves the stage `certificate` on the bus."""
+"""Serves the stage `certificate` on the bus: ``python -m oxbow_certificate``."""
 
 from oxbow.stage import serve_stage
 
-from oxbow.contracts import CERTIFY
-
 if __name__ == "__main__":
-    serve_stage(CERTIFY, "oxbow_certificate.service:handle")
+    serve_stage("oxbow.contracts:CERTIFY", "oxbow_certificate.service:handle")

@@ -1,0 +1,72 @@
+"""Which replicas of each stage are alive, and which of them to ask next."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+import time
+from collections import Counter, defaultdict
+from collections.abc import Collection
+
+__all__ = ["Replicas"]
+
+
+class Replicas:
+    """Shares one caller's requests among the live replicas of each stage.
+
+    The replica with the fewest of this caller's requests outstanding is next, and the one longest not asked
+    among equals. `most_outstanding` keeps a caller from filling the queue of a slow replica while another is free.
+    """
+
+    def __init__(self, most_outstanding: int) -> None:
+        self.most_outstanding = most_outstanding
+        self._changed = threading.Condition()
+        self._alive: defaultdict[str, set[str]] = defaultdict(set)
+        self._outstanding: Counter[tuple[str, str]] = Counter()
+        self._asked: dict[tuple[str, str], int] = {}
+        self._turns = itertools.count()
+
+    def update(self, stage: str, instance: str, alive: bool) -> None:
+        """Note that a replica has come or gone."""
+        with self._changed:
+            if alive:
+                self._alive[stage].add(instance)
+            else:
+                self._alive[stage].discard(instance)
+            self._changed.notify_all()
+
+    def alive(self, stage: str) -> tuple[str, ...]:
+        with self._changed:
+            return tuple(sorted(self._alive[stage]))
+
+    def wait_alive(self, stages: Collection[str], timeout_s: float) -> tuple[str, ...]:
+        """Wait until each of `stages` has a live replica; return those that have none after `timeout_s`."""
+        with self._changed:
+            self._changed.wait_for(lambda: all(self._alive[stage] for stage in stages), timeout_s)
+            return tuple(stage for stage in stages if not self._alive[stage])
+
+    def acquire(self, stage: str, avoid: Collection[str], timeout_s: float) -> str | None:
+        """Choose a live replica, preferably none to `avoid`, and count a request on it; None after `timeout_s`."""
+        give_up = time.monotonic() + timeout_s
+        with self._changed:
+            while (instance := self._best(stage, avoid)) is None:
+                if not self._changed.wait(give_up - time.monotonic()):
+                    return None
+            self._outstanding[stage, instance] += 1
+            self._asked[stage, instance] = next(self._turns)
+            return instance
+
+    def release(self, stage: str, instance: str) -> None:
+        """The request on `instance` is over, one way or another."""
+        with self._changed:
+            self._outstanding[stage, instance] -= 1
+            self._changed.notify_all()
+
+    def _best(self, stage: str, avoid: Collection[str]) -> str | None:
+        alive = self._alive[stage]
+        candidates = [
+            (self._outstanding[stage, instance], self._asked.get((stage, instance), -1), instance)
+            for instance in (alive - set(avoid)) or alive
+            if self._outstanding[stage, instance] < self.most_outstanding
+        ]
+        return min(candidates)[2] if candidates else None

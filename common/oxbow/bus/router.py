@@ -1,0 +1,115 @@
+"""The tiny router process of the embedded stack; a deployment runs `zenohd` in its place.
+
+``python -m oxbow.bus.router --listen tcp/127.0.0.1:7447``
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import logging
+import os
+import select
+import socket
+import subprocess
+import sys
+from dataclasses import dataclass
+
+import zenoh
+
+from oxbow.bus.config import DEFAULT_ENDPOINT, router_config
+from oxbow.errors import Unavailable
+from oxbow.lifetime import Lifetime
+
+__all__ = ["RouterProcess", "run_router", "start_router"]
+
+_FREE_PORT = ":0"
+_FREE_PORT_TRIES = 5
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class RouterProcess:
+    """A router that runs, and where."""
+
+    endpoint: str
+    process: subprocess.Popen[bytes]
+
+
+def start_router(listen: str = "tcp/127.0.0.1:0", *, timeout_s: float = 5.0) -> RouterProcess:
+    """Start a router process that ends with this one, and return once it listens.
+
+    Parameters
+    ----------
+    listen
+        Port 0 stands for any free port.
+
+    Raises
+    ------
+    Unavailable
+        It could not listen there; it says why on stderr.
+    """
+    read_fd, write_fd = os.pipe()
+    command = [sys.executable, "-m", __name__, "--listen", listen, "--ready-fd", str(write_fd)]
+    process = subprocess.Popen([*command, "--parent", str(os.getpid())], pass_fds=[write_fd], stdout=2)
+    os.close(write_fd)
+    with os.fdopen(read_fd, "rb") as ready:
+        arrived, _, _ = select.select([ready], [], [], timeout_s)
+        endpoint = ready.readline().decode().strip() if arrived else ""
+    if not endpoint:
+        process.kill()
+        process.wait()
+        raise Unavailable(f"the router did not come up within {timeout_s:g} s", where=listen)
+    return RouterProcess(endpoint, process)
+
+
+def run_router(listen: str, lifetime: Lifetime, ready_fd: int | None = None) -> None:
+    """Route until `lifetime` is over; write the endpoint to `ready_fd` once it listens."""
+    session, endpoint = _open(listen)
+    with session:
+        _log.info("router listens on %s", endpoint)
+        if ready_fd is not None:
+            with os.fdopen(ready_fd, "w") as ready, contextlib.suppress(BrokenPipeError):
+                ready.write(endpoint + "\n")
+        lifetime.wait()
+
+
+def _open(listen: str) -> tuple[zenoh.Session, str]:
+    tries = _FREE_PORT_TRIES if listen.endswith(_FREE_PORT) else 1
+    while True:
+        tries -= 1
+        endpoint = _with_free_port(listen) if listen.endswith(_FREE_PORT) else listen
+        try:
+            return zenoh.open(router_config(endpoint)), endpoint
+        except zenoh.ZError as error:
+            # Another process may have taken the free port in between.
+            if tries == 0:
+                raise Unavailable(f"the router cannot listen: {error}", where=endpoint) from error
+
+
+def _with_free_port(listen: str) -> str:
+    """`listen` with a port of its host that was free a moment ago."""
+    address = listen.removesuffix(_FREE_PORT)
+    with socket.socket() as probe:
+        probe.bind((address.partition("/")[2], 0))
+        return f"{address}:{probe.getsockname()[1]}"
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the router; the exit status of the process."""
+    parser = argparse.ArgumentParser(prog="oxbow.bus.router", description="Route between Oxbow's processes.")
+    parser.add_argument("--listen", default=DEFAULT_ENDPOINT, help="port 0: any free port (default: %(default)s)")
+    parser.add_argument("--ready-fd", type=int, help="write the endpoint to this file descriptor when it listens")
+    parser.add_argument("--parent", type=int, help="end when this parent process has ended")
+    options = parser.parse_args(argv)
+    logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s")
+    try:
+        run_router(options.listen, Lifetime(options.parent), options.ready_fd)
+    except Unavailable as error:
+        _log.error("%s", error)
+        return 4
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,311 @@
+"""One session on the bus: publish, subscribe, answer, query, and be seen alive.
+
+Nothing here knows a message's type: a process that only forwards bytes imports this module alone, and pays for
+neither numpy nor shapely.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Iterable, Iterator
+from types import TracebackType
+from typing import Any, Protocol, Self
+from urllib.parse import unquote
+
+import msgspec
+import zenoh
+from zenoh.handlers import Callback
+
+from oxbow.bus.config import DEFAULT_ENDPOINT, client_config
+from oxbow.bus.mailbox import Mailbox
+from oxbow.errors import Busy, DeadlineExceeded, ErrorReply, Internal, OxbowError, Unavailable
+
+__all__ = [
+    "JSON",
+    "MSGPACK",
+    "Audience",
+    "OnQuery",
+    "OnSample",
+    "Session",
+    "Subscription",
+    "error_of",
+    "reply_error",
+]
+
+JSON = "application/json"
+MSGPACK = "application/msgpack"
+OPEN_ATTEMPT_S = 1.0
+
+OnSample = Callable[[str, bytes], None]
+"""Called with a sample's key and payload."""
+
+OnQuery = Callable[[str, dict[str, str], bytes], Iterable[tuple[str, bytes]]]
+"""Called with a query's key, parameters and payload; gives replies, each a key and a payload."""
+
+_log = logging.getLogger(__name__)
+
+
+class _Declared(Protocol):
+    def undeclare(self) -> Any: ...
+
+
+class Subscription:
+    """Something that receives until it is closed."""
+
+    def __init__(self, declared: Iterable[_Declared], mailbox: Mailbox[Any]) -> None:
+        self._declared = tuple(declared)
+        self._mailbox = mailbox
+
+    def close(self) -> None:
+        """Receive nothing more, and return when all that had been received is dealt with."""
+        for declared in self._declared:
+            declared.undeclare()
+        self._mailbox.close()
+
+
+class Audience:
+    """Whether anyone listens to keys that match an expression."""
+
+    def __init__(self, publisher: zenoh.Publisher) -> None:
+        self._publisher = publisher
+
+    def __bool__(self) -> bool:
+        return bool(self._publisher.matching_status.matching)  # type: ignore[attr-defined]
+
+
+class Session:
+    """A client of the router; a context manager that leaves the bus on exit. Safe to share between threads.
+
+    Callbacks run on zenoh's network thread and only put into a bounded queue, since one that takes its time
+    stops the whole session. They are `direct`: zenoh's own helper threads would keep a program that forgot to
+    close its session from ending.
+    """
+
+    def __init__(self, session: zenoh.Session, endpoint: str) -> None:
+        self.endpoint = endpoint
+        self._session = session
+        self._subscriptions: list[Subscription] = []
+        self._tokens: dict[str, zenoh.LivelinessToken] = {}
+
+    @classmethod
+    def connect(cls, endpoint: str = DEFAULT_ENDPOINT, *, timeout_s: float = 5.0) -> Self:
+        """Join the router at `endpoint`.
+
+        Raises
+        ------
+        Unavailable
+            Nothing answered at `endpoint` within `timeout_s`.
+        """
+        give_up = time.monotonic() + timeout_s
+        while True:
+            # zenoh.open is deaf to signals: short attempts keep Ctrl-C working.
+            attempt_s = min(OPEN_ATTEMPT_S, max(0.1, give_up - time.monotonic()))
+            try:
+                return cls(zenoh.open(client_config(endpoint, attempt_s)), endpoint)
+            except zenoh.ZError as error:
+                if time.monotonic() >= give_up:
+                    raise Unavailable(
+                        f"no router answers there within {timeout_s:g} s ({error}); start one with `oxbow up`",
+                        where=endpoint,
+                    ) from error
+                time.sleep(0.05)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave the bus: no longer alive, then nothing more received, then what was received is dealt with."""
+        for key in tuple(self._tokens):
+            self.undeclare_live(key)
+        for subscription in self._subscriptions:
+            subscription.close()
+        self._session.close()
+
+    def publish(
+        self, key: str, payload: bytes, *, encoding: str = JSON, urgent: bool = False, droppable: bool = False
+    ) -> None:
+        """Put a sample.
+
+        A sample put while the router is away is lost: whatever matters is kept by its publisher, which answers
+        queries for it.
+
+        Parameters
+        ----------
+        urgent
+            Overtakes other traffic.
+        droppable
+            Lost rather than waited for on a congested link, and sent after all other traffic.
+        """
+        priority = zenoh.Priority.INTERACTIVE_HIGH if urgent else zenoh.Priority.DATA
+        self._session.put(
+            key,
+            payload,
+            encoding=encoding,
+            congestion_control=zenoh.CongestionControl.DROP if droppable else zenoh.CongestionControl.BLOCK,
+            priority=zenoh.Priority.DATA_LOW if droppable else priority,
+        )
+
+    def subscribe(self, key_expr: str, on_sample: OnSample, *, queue_size: int = 1024) -> Subscription:
+        """Receive samples, one after another, on a thread of this subscription.
+
+        Samples that find the queue full are lost, which is logged.
+        """
+        mailbox = Mailbox[zenoh.Sample](
+            f"subscription {key_expr}",
+            lambda sample: on_sample(str(sample.key_expr), sample.payload.to_bytes()),
+            size=queue_size,
+        )
+
+        def accept(sample: zenoh.Sample) -> None:
+            if not mailbox.offer(sample):
+                _log.warning("%s: the queue of %d is full; a sample is lost", sample.key_expr, queue_size)
+
+        declared = self._session.declare_subscriber(key_expr, Callback(accept, indirect=False))
+        return self._keep(Subscription([declared], mailbox))
+
+    def answer(
+        self, key_expr: str | Iterable[str], on_query: OnQuery, *, workers: int = 1, queue_size: int = 64
+    ) -> Subscription:
+        """Answer queries (JSON) for one or several key expressions, on `workers` threads.
+
+        An `OxbowError` travels to the asker as it is; any other exception is logged and travels as `internal`.
+        A query that finds the queue full is answered `busy`.
+        """
+        keys = [key_expr] if isinstance(key_expr, str) else list(key_expr)
+
+        def deliver(query: zenoh.Query) -> None:
+            with query:
+                try:
+                    for key, reply in on_query(str(query.key_expr), _parameters(query), _payload(query)):
+                        query.reply(key, reply, encoding=JSON)
+                except OxbowError as error:
+                    reply_error(query, error)
+                except Exception as error:  # noqa: BLE001 - becomes an `internal` reply
+                    _log.exception("%s: no answer", query.key_expr)
+                    reply_error(query, Internal(f"{type(error).__name__}: {error}", where=keys[0]))
+
+        mailbox = Mailbox[zenoh.Query](f"answer {keys[0]}", deliver, size=queue_size, workers=workers)
+
+        def accept(query: zenoh.Query) -> None:
+            if not mailbox.offer(query):
+                with query:
+                    reply_error(query, Busy(f"{queue_size} queries are waiting; try again later", where=keys[0]))
+
+        declared = [self.declare_queryable(key, accept) for key in keys]
+        return self._keep(Subscription(declared, mailbox))
+
+    def declare_queryable(self, key: str, accept: Callable[[zenoh.Query], None]) -> zenoh.Queryable[None]:
+        """Receive queries on the network thread: `accept` must hand them on at once."""
+        return self._session.declare_queryable(key, Callback(accept, indirect=False))
+
+    def query(
+        self,
+        selector: str,
+        payload: bytes = b"",
+        *,
+        timeout_s: float,
+        all_targets: bool = False,
+        may_be_empty: bool = False,
+    ) -> list[tuple[str, bytes]]:
+        """Ask, and return the replies: each a key and a payload.
+
+        Parameters
+        ----------
+        selector
+            A key expression, with ``?name=value;...`` where there are parameters.
+        all_targets
+            Ask everyone who can answer; an error of one does not hide the replies of others.
+        may_be_empty
+            Return an empty list where nobody answered.
+
+        Raises
+        ------
+        OxbowError
+            The error that was replied; `DeadlineExceeded` after `timeout_s`; `Unavailable` where nobody answered.
+        """
+        found: list[tuple[str, bytes]] = []
+        failure: OxbowError | None = None
+        for reply in self._get(selector, payload, timeout_s=timeout_s, all_targets=all_targets):
+            if reply.ok is not None:
+                found.append((str(reply.ok.key_expr), reply.ok.payload.to_bytes()))
+            elif reply.err is not None:
+                failure = error_of(reply.err, selector, timeout_s)
+        if failure is not None and not (all_targets and found):
+            raise failure
+        if not found and not may_be_empty:
+            raise Unavailable("nobody answers there", where=selector)
+        return found
+
+    def audience(self, key_expr: str) -> Audience:
+        """Watch whether anyone subscribes to keys that match `key_expr`."""
+        return Audience(self._session.declare_publisher(key_expr))
+
+    def declare_live(self, key: str) -> None:
+        """Be seen alive under `key` until `undeclare_live`, `close`, or the death of this process."""
+        self._tokens[key] = self._session.liveliness().declare_token(key)
+
+    def undeclare_live(self, key: str) -> None:
+        """Be seen no more."""
+        self._tokens.pop(key).undeclare()
+
+    def _watch_liveness(self, key_expr: str, on_change: Callable[[str, bool], None]) -> None:
+        """Call `on_change(key, alive)` for every token now and later; on the network thread, so briefly."""
+
+        def accept(sample: zenoh.Sample) -> None:
+            on_change(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
+        self._session.liveliness().declare_subscriber(key_expr, Callback(accept, indirect=False), history=True)
+
+    def _get(
+        self,
+        selector: str,
+        payload: bytes,
+        *,
+        timeout_s: float,
+        all_targets: bool = False,
+        attachment: bytes | None = None,
+    ) -> Iterator[zenoh.Reply]:
+        target = zenoh.QueryTarget.ALL if all_targets else zenoh.QueryTarget.BEST_MATCHING
+        try:
+            yield from self._session.get(
+                selector,
+                payload=payload,
+                attachment=attachment,
+                timeout=timeout_s,
+                target=target,
+                consolidation=zenoh.ConsolidationMode.NONE,
+            )
+        except zenoh.ZError as error:
+            raise Unavailable(f"cannot ask: {error}", where=selector) from error
+
+    def _keep(self, subscription: Subscription) -> Subscription:
+        self._subscriptions.append(subscription)
+        return subscription
+
+
+def reply_error(query: zenoh.Query, error: OxbowError) -> None:
+    """Answer a query with an error; the JSON encoding tells it from zenoh's own."""
+    query.reply_err(msgspec.json.encode(ErrorReply.of(error)), encoding=JSON)
+
+
+def error_of(reply: zenoh.ReplyError, selector: str, timeout_s: float) -> OxbowError:
+    """The exception that an error reply stands for."""
+    if str(reply.encoding) == JSON:
+        return msgspec.json.decode(reply.payload.to_bytes(), type=ErrorReply).error()
+    # Zenoh's own error replies are plain text, and the only one that reaches a caller is its time-out.
+    return DeadlineExceeded(f"no answer within {timeout_s:.1f} s ({reply.payload})", where=selector)
+
+
+def _payload(query: zenoh.Query) -> bytes:
+    return query.payload.to_bytes() if query.payload is not None else b""
+
+
+def _parameters(query: zenoh.Query) -> dict[str, str]:
+    pairs = (part.partition("=") for part in str(query.parameters).split(";") if part)
+    return {unquote(name): unquote(value) for name, _, value in pairs}

@@ -1,0 +1,47 @@
+"""What a replica of a stage tells about itself, beside its instance key (JSON)."""
+
+from __future__ import annotations
+
+import msgspec
+
+__all__ = ["Info", "Ping", "Stats"]
+
+
+class Ping(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer to ``@ping``: the session process is awake."""
+
+    stage: str
+    instance: str
+    pid: int
+    uptime_s: float
+
+
+class Info(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer to ``@info``: what runs here."""
+
+    stage: str
+    instance: str
+    version: str
+    handler: str
+    started_s: float
+    worker_pid: int
+
+
+class Stats(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer to ``@stats``: counts since the start, and times over the last thousand requests.
+
+    `failed` counts error replies other than `busy`; `mean_s` and `p95_s` are seconds of work in the worker
+    process, waiting in the queue not included.
+    """
+
+    stage: str
+    instance: str
+    served: int
+    failed: int
+    busy: int
+    queued: int
+    mean_s: float
+    p95_s: float
+    worker_restarts: int
+    session_rss_bytes: int
+    worker_rss_bytes: int

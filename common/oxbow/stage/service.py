@@ -1,0 +1,224 @@
+"""The session process of a stage: takes queries from the bus, and has its worker process answer them."""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from statistics import fmean, quantiles
+
+import msgspec
+import zenoh
+
+from oxbow.bus.mailbox import Mailbox
+from oxbow.bus.session import MSGPACK, Session, reply_error
+from oxbow.envelope import Envelope
+from oxbow.errors import Busy, DeadlineExceeded, ErrorReply, InvalidMission, OxbowError, Unavailable
+from oxbow.introspection import Info, Ping, Stats
+from oxbow.stage.answered import Answered
+from oxbow.stage.wire import Described, Done, Failed, Job, Shown
+from oxbow.stage.worker import Worker, WorkerLost
+
+__all__ = ["Stage"]
+
+MOST_ANSWERED_BYTES = 16 * 2**20
+_log = logging.getLogger(__name__)
+
+
+class _Exchange:
+    """A request, and the queries that wait for its answer: more than one where a caller asked again."""
+
+    def __init__(self, envelope: Envelope, query: zenoh.Query) -> None:
+        self.envelope = envelope
+        self.queries = [query]
+
+
+class Stage:
+    """One replica of a stage on the bus.
+
+    Parameters
+    ----------
+    session
+        The bus.
+    worker
+        The worker process, just started.
+    instance
+        This replica's name.
+    queue_size
+        Requests that may wait; more are answered `busy`.
+    on_failure
+        Called when no new worker process can be started, which ends this replica.
+    """
+
+    def __init__(
+        self, session: Session, worker: Worker, instance: str, queue_size: int, on_failure: Callable[[], None]
+    ) -> None:
+        self.session = session
+        self.worker = worker
+        self.instance = instance
+        self.on_failure = on_failure
+        self.failed = False
+        self.described: Described = worker.describe()
+        self.started_s = time.time()
+        self._lock = threading.Lock()
+        self._open: dict[str, _Exchange] = {}
+        self._answered = Answered(MOST_ANSWERED_BYTES)
+        self._served = self._failed = self._busy = 0
+        self._seconds: deque[float] = deque(maxlen=1000)
+        self._audience = session.audience(self.described.layers_key)
+        self._requests = Mailbox("requests", self._work, size=queue_size)
+        self._queryable = session.declare_queryable(self.described.instance_key, self._accept)
+        session.answer(self.described.introspection_keys.values(), self._introspect)
+        session.declare_live(self.described.live_key)
+        _log.info("%s serves %s", self.described.instance_key, worker.handler)
+
+    def drain(self) -> None:
+        """Be chosen no more, answer what has been accepted, and end the worker process."""
+        self.session.undeclare_live(self.described.live_key)
+        self._requests.close()
+        self._queryable.undeclare()
+        self.worker.close()
+
+    def _accept(self, query: zenoh.Query) -> None:
+        """Queue a request; on the network thread, so nothing here may take its time."""
+        try:
+            envelope = self._envelope(query)
+            answer = self._enqueue(envelope, query)
+        except OxbowError as error:
+            answer = Failed(error=ErrorReply.of(error))
+        if answer is not None:
+            self._reply(query, answer)
+
+    def _envelope(self, query: zenoh.Query) -> Envelope:
+        size, most = len(query.payload or b""), self.described.most_request_bytes
+        if size > most:
+            raise InvalidMission(f"is {size} bytes; at most {most}", where=self.described.stage)
+        try:
+            return msgspec.json.decode((query.attachment or zenoh.ZBytes()).to_bytes(), type=Envelope)
+        except msgspec.DecodeError as error:
+            raise InvalidMission(f"is no Envelope: {error}", where="attachment") from error
+
+    def _enqueue(self, envelope: Envelope, query: zenoh.Query) -> Done | Failed | None:
+        """Wait for the answer to an equal request, or queue a new one; return an answer that is there already."""
+        with self._lock:
+            same = self._open.get(envelope.request_id)
+            if same is not None:
+                same.queries.append(query)
+                return None
+            answer = self._answered.get(envelope.request_id)
+            if answer is not None:
+                return answer
+            exchange = _Exchange(envelope, query)
+            if not self._requests.offer(exchange):
+                self._busy += 1
+                raise Busy(f"{len(self._requests)} requests are waiting", where=self.described.instance_key)
+            self._open[envelope.request_id] = exchange
+            return None
+
+    def _work(self, exchange: _Exchange) -> None:
+        started = time.monotonic()
+        try:
+            answer = self._answer(exchange)
+        except OxbowError as error:
+            answer = Failed(error=ErrorReply.of(error))
+            lasting = False
+        else:
+            lasting = True
+        with self._lock:
+            del self._open[exchange.envelope.request_id]
+            if lasting:
+                self._answered.put(exchange.envelope.request_id, answer)
+            self._served += 1
+            self._failed += isinstance(answer, Failed)
+            self._seconds.append(time.monotonic() - started)
+        for query in exchange.queries:
+            self._reply(query, answer)
+
+    def _answer(self, exchange: _Exchange) -> Done | Failed:
+        """Have the worker answer; what is raised here says nothing of the request, which may be asked again."""
+        envelope, stage = exchange.envelope, self.described.stage
+        if envelope.remaining_s() <= 0:
+            raise DeadlineExceeded("not started: the deadline passed in the queue", where=stage)
+        if not self.worker.alive():
+            self._restart()
+        payload = (exchange.queries[0].payload or zenoh.ZBytes()).to_bytes()
+        job = Job(envelope=envelope, payload=payload, show=bool(envelope.mission_id and self._audience))
+        try:
+            return self.worker.run(job, self._publish)
+        except (WorkerLost, DeadlineExceeded) as error:
+            _log.error("request %s: %s", envelope.request_id, error)
+            self._restart()
+            raise
+
+    def _restart(self) -> None:
+        try:
+            self.worker.restart()
+        except Unavailable:
+            _log.exception("%s: no new worker process; this replica ends", self.described.instance_key)
+            self.failed = True
+            self.on_failure()
+            raise
+
+    def _publish(self, shown: Shown) -> None:
+        self.session.publish(shown.key, shown.payload, encoding=MSGPACK, droppable=True)
+
+    def _reply(self, query: zenoh.Query, answer: Done | Failed) -> None:
+        with query:
+            if isinstance(answer, Done):
+                query.reply(self.described.instance_key, answer.payload, encoding=MSGPACK)
+            else:
+                reply_error(query, answer.error.error())
+
+    def _introspect(self, key: str, _parameters: dict[str, str], _payload: bytes) -> Iterator[tuple[str, bytes]]:
+        answers = {"ping": self._ping, "info": self._info, "stats": self._stats, "schema": self._schema}
+        for what, own_key in self.described.introspection_keys.items():
+            if key.endswith(f"@{what}"):
+                yield own_key, msgspec.json.encode(answers[what]())
+
+    def _ping(self) -> Ping:
+        uptime_s = time.time() - self.started_s
+        return Ping(stage=self.described.stage, instance=self.instance, pid=os.getpid(), uptime_s=uptime_s)
+
+    def _info(self) -> Info:
+        return Info(
+            stage=self.described.stage,
+            instance=self.instance,
+            version=self.described.version,
+            handler=self.worker.handler,
+            started_s=self.started_s,
+            worker_pid=self.worker.pid,
+        )
+
+    def _schema(self) -> msgspec.Raw:
+        return msgspec.Raw(self.described.schema)
+
+    def _stats(self) -> Stats:
+        with self._lock:
+            seconds = list(self._seconds)
+            served, failed, busy = self._served, self._failed, self._busy
+        return Stats(
+            stage=self.described.stage,
+            instance=self.instance,
+            served=served,
+            failed=failed,
+            busy=busy,
+            queued=len(self._requests),
+            mean_s=fmean(seconds) if seconds else 0.0,
+            p95_s=quantiles(seconds, n=20, method="inclusive")[-1] if len(seconds) > 1 else sum(seconds),
+            worker_restarts=self.worker.restarts,
+            session_rss_bytes=_rss_bytes(os.getpid()),
+            worker_rss_bytes=_rss_bytes(self.worker.pid),
+        )
+
+
+def _rss_bytes(pid: int) -> int:
+    """Resident memory of a process; 0 where the system does not tell."""
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    except OSError:
+        return 0
+    return pages * os.sysconf("SC_PAGE_SIZE")

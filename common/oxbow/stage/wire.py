@@ -1,0 +1,56 @@
+"""What a stage's session process and its worker process say to each other, over a pipe (MessagePack)."""
+
+from __future__ import annotations
+
+import msgspec
+
+from oxbow.envelope import Envelope
+from oxbow.errors import ErrorReply
+
+__all__ = ["Described", "Done", "Failed", "FromWorker", "Job", "Shown"]
+
+
+class Job(msgspec.Struct, frozen=True, kw_only=True):
+    """A request for the worker; layers are of use to someone where `show` is set."""
+
+    envelope: Envelope
+    payload: bytes
+    show: bool
+
+
+class Described(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+    """The worker is ready: what it serves, under which keys.
+
+    The session process learns the keys from here, since importing the contracts would cost it numpy and shapely.
+    """
+
+    stage: str
+    version: str
+    instance_key: str
+    live_key: str
+    introspection_keys: dict[str, str]
+    layers_key: str
+    most_request_bytes: int
+    schema: bytes
+
+
+class Shown(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+    """A layer to publish."""
+
+    key: str
+    payload: bytes
+
+
+class Done(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+    """The encoded reply to a job."""
+
+    payload: bytes
+
+
+class Failed(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+    """The error that a job ended in."""
+
+    error: ErrorReply
+
+
+FromWorker = Described | Shown | Done | Failed
