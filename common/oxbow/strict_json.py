@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import Any, TypeVar
 
 import msgspec
+from msgspec import inspect
 
 from oxbow.errors import InvalidMission
 
@@ -17,17 +19,10 @@ _MISTYPED = re.compile(r"(?P<problem>.*?)(?: - at `\$\.?(?P<path>.*)`)?", re.DOT
 _MISSING = re.compile(r"Object missing required field `(.*)`")
 _UNKNOWN = re.compile(r"Object contains unknown field `(.*)`")
 _BYTE = re.compile(r" \(byte (\d+)\)")
-_PLAIN_NAMES = {
-    "float": "a number",
-    "int": "a whole number",
-    "str": "a string",
-    "bool": "true or false",
-    "object": "an object",
-    "array": "a list",
-}
+_STEP = re.compile(r"(?P<key>[^.\[\]]+)|\[(?P<index>\d+)\]|(?P<any>\[\.\.\.\])")
 
 
-def decode_json(data: bytes, kind: type[T], name: str) -> T:
+def decode_json(data: bytes, kind: type[T], name: str, *, at: str = "") -> T:
     """Decode `data` as `kind`, a type that msgspec can decode; nothing is converted on the way.
 
     Parameters
@@ -35,9 +30,11 @@ def decode_json(data: bytes, kind: type[T], name: str) -> T:
     data
         JSON in UTF-8.
     kind
-        The structure to expect.
+        The type to expect.
     name
         What the document is called in errors.
+    at
+        Where it stands in a larger document: fields in errors are named from there.
 
     Raises
     ------
@@ -48,13 +45,13 @@ def decode_json(data: bytes, kind: type[T], name: str) -> T:
     try:
         return msgspec.json.decode(data, type=kind)
     except msgspec.ValidationError as error:
-        raise _mistyped(str(error), data, name) from error
+        raise _mistyped(str(error), data, kind, name, at) from error
     except msgspec.DecodeError as error:
         raise InvalidMission(f"is not JSON: {_located(str(error), data)}", where=name) from error
+    except UnicodeDecodeError as error:
+        raise InvalidMission("is not JSON: a string is not UTF-8", where=name) from error
     except RecursionError as error:
         raise InvalidMission("is nested too deeply to be read", where=name) from error
-    except UnicodeDecodeError as error:
-        raise InvalidMission(f"is not JSON: not UTF-8 at byte {error.start}", where=name) from error
 
 
 def _located(problem: str, data: bytes) -> str:
@@ -69,33 +66,79 @@ def _located(problem: str, data: bytes) -> str:
     return f"{problem[: match.start()]} on line {line}, in {' '.join(seen.split())!r}{hint}"
 
 
-def _mistyped(text: str, data: bytes, name: str) -> InvalidMission:
+def _mistyped(text: str, data: bytes, kind: Any, name: str, at: str) -> InvalidMission:
     match = _MISTYPED.fullmatch(text)
     problem, path = (match["problem"], match["path"] or "") if match else (text, "")
-    if missing := _MISSING.fullmatch(problem):
-        return InvalidMission("is missing; it is required", where=f"{path}.{missing[1]}".lstrip("."))
-    if unknown := _UNKNOWN.fullmatch(problem):
-        return InvalidMission(f"has a field {unknown[1]!r}, which has no meaning here", where=path or name)
-    value = _value_at(path, data)
-    return InvalidMission(f"is {value}; {_expected(problem)}" if value else problem, where=path or name)
+    missing, unknown = _MISSING.fullmatch(problem), _UNKNOWN.fullmatch(problem)
+    inner = f"{path}.{missing[1]}".lstrip(".") if missing else path
+    where = (f"{at}{inner}" if inner.startswith("[") else f"{at}.{inner}").strip(".") or name
+    if missing:
+        return InvalidMission("is missing; it is required", where=where)
+    accepted = _described(_type_at(kind, path))
+    if unknown:
+        return InvalidMission(f"has a field {unknown[1]!r}; expected {accepted} and nothing else", where=where)
+    return InvalidMission(f"is {_text_at(path, data)}; expected {accepted}", where=where)
 
 
-def _expected(problem: str) -> str:
-    if problem == "Number out of range":
-        return "expected a finite number"
-    kinds = re.match(r"Expected `([a-z |]+)`(.*?)(, got .*)?$", problem)
-    if kinds is None:
-        return problem[0].lower() + problem[1:]
-    return "expected " + " or ".join(_PLAIN_NAMES.get(kind, kind) for kind in kinds[1].split(" | ")) + kinds[2]
+def _steps(path: str) -> Iterator[re.Match[str]]:
+    """The steps of a path such as ``a[3].b``; ``[...]`` stands for some key of a mapping."""
+    return _STEP.finditer(path)
 
 
-def _value_at(path: str, data: bytes) -> str:
-    """The text of the value that stands at `path` (``a[3].b``), or nothing where the path is not exact."""
-    raw: Any = msgspec.Raw(data)
-    for key, index in re.findall(r"([^.\[\]]+)|\[(\d+|\.\.\.)\]", path):
-        if index == "...":
-            return ""
-        raw = msgspec.json.decode(raw, type=dict[str, msgspec.Raw])[key] if key and not index else raw
-        raw = msgspec.json.decode(raw, type=list[msgspec.Raw])[int(index)] if index else raw
+def _text_at(path: str, data: bytes) -> str:
+    """The JSON text of the value that stands at `path`, shortened."""
+    raw = msgspec.Raw(data)
+    for step in _steps(path):
+        if step["any"]:
+            break
+        if step["key"]:
+            raw = msgspec.json.decode(raw, type=dict[str, msgspec.Raw])[step["key"]]
+        else:
+            raw = msgspec.json.decode(raw, type=list[msgspec.Raw])[int(step["index"])]
     text = " ".join(bytes(raw).decode("utf-8", "replace").split())
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _type_at(kind: Any, path: str) -> inspect.Type:
+    """The type that is expected at `path`."""
+    found: Any = inspect.type_info(kind)
+    for step in _steps(path):
+        if isinstance(found, inspect.UnionType):
+            found = next(option for option in found.types if not isinstance(option, inspect.NoneType))
+        if isinstance(found, inspect.StructType):
+            found = next(field.type for field in found.fields if field.encode_name == step["key"])
+        elif isinstance(found, inspect.TupleType):
+            found = found.item_types[int(step["index"])]
+        elif isinstance(found, inspect.DictType):
+            found = found.value_type
+        elif isinstance(found, inspect.VarTupleType | inspect.ListType):
+            found = found.item_type
+    return found  # type: ignore[no-any-return]
+
+
+def _described(kind: inspect.Type) -> str:  # noqa: PLR0911 - one line a type
+    match kind:
+        case inspect.FloatType():
+            return "a finite number"
+        case inspect.IntType():
+            return "a whole number"
+        case inspect.StrType():
+            return "a string"
+        case inspect.BoolType():
+            return "true or false"
+        case inspect.EnumType(cls=choices):
+            return f"one of {', '.join(choices)}"
+        case inspect.StructType(fields=fields):
+            return f"an object with {', '.join(field.encode_name for field in fields if field.required)}"
+        case inspect.DictType():
+            return "an object"
+        case inspect.TupleType(item_types=items):
+            return f"a list of {len(items)} values"
+        case inspect.VarTupleType(min_length=least) | inspect.ListType(min_length=least):
+            return f"a list of {least} values or more" if least else "a list"
+        case inspect.UnionType(types=options):
+            return " or ".join(
+                _described(option) for option in options if not isinstance(option, inspect.NoneType)
+            )
+        case _:
+            return "another value"
