@@ -64,12 +64,12 @@ class _Open:
     ceiling_from: Mark
     start: int
 
-    def middle(self, u: float) -> float:
-        return 0.5 * (self.floor.cut_below(u).v + self.ceiling.cut_above(u).v)
+    def middle(self, vertex: Mark) -> float:
+        return 0.5 * (self.floor.cut_below(vertex).v + self.ceiling.cut_above(vertex).v)
 
-    def margin(self, u: float, v: float) -> float:
-        """How far inside the cell (u, v) is along the sweep line; negative outside."""
-        return min(v - self.floor.cut_below(u).v, self.ceiling.cut_above(u).v - v)
+    def margin(self, vertex: Mark) -> float:
+        """How far inside the cell a vertex is, along the sweep line; negative outside."""
+        return min(vertex.v - self.floor.cut_below(vertex).v, self.ceiling.cut_above(vertex).v - vertex.v)
 
 
 @dataclass(slots=True)
@@ -94,14 +94,13 @@ class _Sweep:
         return kind
 
     def _open(self, at: Extreme) -> CriticalKind:
-        self._begin(self._position(at), at.floor, at.floor.first, at.ceiling, at.ceiling.first)
+        self._begin(self._position(at.place), at.floor, at.floor.first, at.ceiling, at.ceiling.first)
         return CriticalKind.OPEN
 
     def _split(self, at: Extreme) -> CriticalKind:
-        u, v = at.place.u, at.place.v
-        position = self._position(at)
-        cell = max(self.line[max(position - 1, 0) : position + 1], key=lambda cell: cell.margin(u, v))
-        floor_at, ceiling_at = cell.floor.cut_below(u), cell.ceiling.cut_above(u)
+        position = self._position(at.place)
+        cell = max(self.line[max(position - 1, 0) : position + 1], key=lambda cell: cell.margin(at.place))
+        floor_at, ceiling_at = cell.floor.cut_below(at.place), cell.ceiling.cut_above(at.place)
         position = self._end(cell, floor_at, ceiling_at)
         self._begin(position, cell.floor, floor_at, at.ceiling, at.ceiling.first)
         self._begin(position + 1, at.floor, at.floor.first, cell.ceiling, ceiling_at)
@@ -113,15 +112,15 @@ class _Sweep:
 
     def _merge(self, at: Extreme) -> CriticalKind:
         lower, upper = self.below[at.ceiling], self.above[at.floor]
-        floor_at, ceiling_at = lower.floor.cut_below(at.place.u), upper.ceiling.cut_above(at.place.u)
+        floor_at, ceiling_at = lower.floor.cut_below(at.place), upper.ceiling.cut_above(at.place)
         self._end(upper, at.floor.last, ceiling_at)
         position = self._end(lower, floor_at, at.ceiling.last)
         self._begin(position, lower.floor, floor_at, upper.ceiling, ceiling_at)
         return CriticalKind.MERGE
 
-    def _position(self, at: Extreme) -> int:
+    def _position(self, vertex: Mark) -> int:
         """How many open cells have their middle below a vertex (or level with it)."""
-        return bisect(self.line, at.place.v, key=lambda cell: cell.middle(at.place.u))
+        return bisect(self.line, vertex.v, key=lambda cell: cell.middle(vertex))
 
     def _begin(self, position: int, floor: Chain, floor_at: Mark, ceiling: Chain, ceiling_at: Mark) -> None:
         cell = _Open(floor, ceiling, floor_at, ceiling_at, start=self.met)

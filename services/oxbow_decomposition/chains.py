@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -22,9 +23,9 @@ from oxbow_decomposition.boundary import distinct
 __all__ = ["Chain", "Extreme", "Mark", "extremes"]
 
 GRID_BITS = 44
-"""Abscissae are rounded to 2^-44 of the site's extent, a few hundred times the noise of the rotation.
+"""Abscissae are compared in steps of 2^-44 of the site's extent, a few hundred times the noise of the rotation.
 
-It makes a straight shore along the transects exactly upright, not a saw of critical points.
+So a straight shore along the transects is upright, not a saw of critical points; no vertex is moved.
 """
 
 TURN_ERROR = 4.0 * 2.0**-53
@@ -33,50 +34,61 @@ TURN_ERROR = 4.0 * 2.0**-53
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A place (u, v) on a chain, with the vertices from `index` on after it."""
+    """A place (u, v) on a chain, with the vertices from `index` on after it; `column` is u as it is compared."""
 
+    column: float
     u: float
     v: float
     index: int
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class Chain:
-    """Vertices in lexicographic order, shape (n, 2), with n >= 2."""
+    """Vertices in the order of (column, v).
 
-    __slots__ = ("points", "u")
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        The vertices in the sweep frame; n >= 2.
+    columns : ndarray, shape (n,)
+        Their u as it is compared: rounded, non-decreasing.
+    """
 
-    def __init__(self, points: FloatArray) -> None:
-        self.points = points
-        self.u = np.ascontiguousarray(points[:, 0])
+    points: FloatArray
+    columns: FloatArray
+
+    def mark(self, index: int) -> Mark:
+        u, v = self.points[index].tolist()
+        return Mark(float(self.columns[index]), u, v, index)
 
     @property
     def first(self) -> Mark:
-        u, v = self.points[0].tolist()
-        return Mark(u, v, 0)
+        return self.mark(0)
 
     @property
     def last(self) -> Mark:
-        u, v = self.points[-1].tolist()
-        return Mark(u, v, len(self.points) - 1)
+        return self.mark(len(self.points) - 1)
 
-    def cut_below(self, u: float) -> Mark:
-        """Where a chain below a vertex at `u` is cut: an upright edge at `u` comes before the cut."""
-        return self._cut(int(self.u.searchsorted(u, side="right")), u)
+    def cut_below(self, vertex: Mark) -> Mark:
+        """Where the chain is cut below a vertex: an upright edge in the vertex's column comes before the cut."""
+        return self._cut(vertex, int(self.columns.searchsorted(vertex.column, side="right")))
 
-    def cut_above(self, u: float) -> Mark:
-        """Where a chain above a vertex at `u` is cut: an upright edge at `u` comes after the cut."""
-        return self._cut(int(self.u.searchsorted(u, side="left")), u)
+    def cut_above(self, vertex: Mark) -> Mark:
+        """Where the chain is cut above a vertex: an upright edge in the vertex's column comes after the cut."""
+        return self._cut(vertex, int(self.columns.searchsorted(vertex.column, side="left")))
 
-    def _cut(self, index: int, u: float) -> Mark:
+    def _cut(self, vertex: Mark, index: int) -> Mark:
         u0, v0 = self.points[max(index - 1, 0)].tolist()
         u1, v1 = self.points[min(index, len(self.points) - 1)].tolist()
-        share = (u - u0) / (u1 - u0) if u0 < u < u1 else float(u >= u1)
-        return Mark(u, v0 * (1.0 - share) + v1 * share, index)
+        share = (vertex.u - u0) / (u1 - u0) if u0 < vertex.u < u1 else float(vertex.u >= u1)
+        return Mark(vertex.column, vertex.u, v0 * (1.0 - share) + v1 * share, index)
 
     def between(self, start: Mark, end: Mark) -> FloatArray:
-        """The part of the chain from one mark to another, shape (n, 2), without repeated points."""
+        """The part of the chain from one mark to another, shape (n, 2), u non-decreasing, no point repeated."""
         inner = self.points[start.index : end.index]
-        return distinct(np.concatenate([[(start.u, start.v)], inner, [(end.u, end.v)]]))
+        points = np.concatenate([[(start.u, start.v)], inner, [(end.u, end.v)]])
+        points[:, 0] = np.clip(np.maximum.accumulate(points[:, 0]), start.u, end.u)
+        return distinct(points)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +110,7 @@ class Extreme:
         """Lexicographic; at one place ends, then splits, then opens from the lowest upwards."""
         (u0, v0), (u1, v1) = self.floor.points[:2].tolist()
         slope = math.atan2(v1 - v0, u1 - u0) if self.opens else 0.0
-        return self.place.u, self.place.v, self.minimum, self.opens, slope
+        return self.place.column, self.place.v, self.minimum, self.opens, slope
 
 
 def extremes(walks: list[FloatArray], heading_rad: float) -> list[Extreme]:
@@ -122,29 +134,33 @@ def extremes(walks: list[FloatArray], heading_rad: float) -> list[Extreme]:
 
 
 def _of_walk(planar: FloatArray, heading_rad: float, grid: float) -> Iterator[Extreme]:
-    walk = to_sweep(planar, heading_rad)
-    walk[:, 0] = np.round(walk[:, 0] / grid) * grid
-    rising = _rising(walk)
-    first = -int(np.argmax(rising & ~np.roll(rising, 1)))
-    planar, walk, rising = np.roll(planar, first, axis=0), np.roll(walk, first, axis=0), np.roll(rising, first)
-    minima = np.flatnonzero(rising & ~np.roll(rising, 1))
-    maxima = np.flatnonzero(~rising & np.roll(rising, 1))
-    turns = _turns(walk, minima)
-    turns = np.where(turns == 0, _turns(planar, minima), turns)
+    points = to_sweep(planar, heading_rad)
+    compared = np.column_stack([np.round(points[:, 0] / grid) * grid, points[:, 1]])
+    new = (compared != np.roll(compared, 1, axis=0)).any(axis=1)
+    planar, points, compared = planar[new], points[new], compared[new]
 
-    closed = np.concatenate([walk, walk[:1]])
-    lows, highs = [*minima.tolist(), len(walk)], maxima.tolist()
-    floors = [Chain(closed[low : high + 1]) for low, high in zip(lows[:-1], highs, strict=True)]
-    ceilings = [Chain(closed[high : low + 1][::-1]) for high, low in zip(highs, lows[1:], strict=True)]
+    rising = _rising(compared)
+    ends = np.flatnonzero(rising != np.roll(rising, 1))
+    ends = ends if rising[ends[0]] else np.roll(ends, 1)
+    turns = _turns(compared, ends[::2])
+    turns = np.where(turns == 0, _turns(planar, ends[::2]), turns)
+
+    def chain(start: int, end: int) -> Chain:
+        run = np.arange(start, end + 1 if start < end else end + len(planar) + 1) % len(planar)
+        run = run if rising[start] else run[::-1]
+        return Chain(points[run], compared[run, 0])
+
+    chains = [chain(start, end) for start, end in pairwise([*ends.tolist(), int(ends[0])])]
+    floors, ceilings = chains[::2], chains[1::2]
     for floor, ceiling, turn in zip(floors, [ceilings[-1], *ceilings[:-1]], turns.tolist(), strict=True):
         yield Extreme(place=floor.first, floor=floor, ceiling=ceiling, minimum=True, opens=turn > 0)
     for floor, ceiling in zip(floors, ceilings, strict=True):
         yield Extreme(place=floor.last, floor=floor, ceiling=ceiling, minimum=False, opens=False)
 
 
-def _rising(walk: FloatArray) -> npt.NDArray[np.bool_]:
-    """Whether each vertex is followed by one of higher lexicographic order."""
-    (u, v), (next_u, next_v) = walk.T, np.roll(walk, -1, axis=0).T
+def _rising(vertices: FloatArray) -> npt.NDArray[np.bool_]:
+    """Whether each vertex of a closed walk is followed by one that comes after it in the sweep."""
+    (u, v), (next_u, next_v) = vertices.T, np.roll(vertices, -1, axis=0).T
     rising: npt.NDArray[np.bool_] = (u < next_u) | ((u == next_u) & (v < next_v))
     return rising
 
