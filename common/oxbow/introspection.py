@@ -30,8 +30,8 @@ class Info(msgspec.Struct, frozen=True, kw_only=True):
 class Stats(msgspec.Struct, frozen=True, kw_only=True):
     """Answer to ``@stats``: counts since the start, and times over the last thousand requests.
 
-    `failed` counts error replies other than `busy`; `mean_s` and `p95_s` are seconds of work in the worker
-    process, waiting in the queue not included.
+    `served` counts all answers but `busy`, `failed` those of them that were errors; `mean_s` and `p95_s` are
+    seconds of work in the worker process, waiting in the queue not included.
     """
 
     stage: str

@@ -56,7 +56,7 @@ def handle(request: EchoRequest, show: Show) -> Echo:
         case Deed.DIE:
             os.kill(os.getpid(), signal.SIGKILL)
         case Deed.DIE_ONCE if not os.path.exists(request.path):  # noqa: PTH110
-            open(request.path, "w").close()  # noqa: PTH123, SIM115
+            open(request.path, "w").close()  # noqa: PTH123
             os.kill(os.getpid(), signal.SIGKILL)
         case Deed.REFUSE:
             raise InvalidMission("is wrong; expected something right", where="text")

@@ -28,6 +28,7 @@ MOST_OUTSTANDING = 4
 MOST_WORKER_LOSSES = 3
 """Worker processes that one request may cost before it is taken to be what kills them."""
 
+LOOK_ROUND_S = 0.5
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.02, 0.5
 REPLY_GRACE_S = 0.5
 """How much longer than the deadline to listen, so that the stage's own words about it arrive."""
@@ -46,15 +47,15 @@ class Bus(Session):
 
     def __init__(self, session: zenoh.Session, endpoint: str) -> None:
         super().__init__(session, endpoint)
-        self._replicas = Replicas(MOST_OUTSTANDING)
+        self.replicas = Replicas(MOST_OUTSTANDING)
         self._watch_liveness(ANY_LIVE, self._on_liveness)
 
     def _on_liveness(self, key: str, alive: bool) -> None:
-        self._replicas.update(*live_service(key), alive)
+        self.replicas.update(*live_service(key), alive)
 
     def instances(self, stage: str) -> tuple[str, ...]:
         """The live replicas of a stage."""
-        return self._replicas.alive(stage)
+        return self.replicas.alive(stage)
 
     def wait_ready(self, stages: Iterable[str], timeout_s: float) -> None:
         """Return once each of `stages` has a live replica.
@@ -64,7 +65,7 @@ class Bus(Session):
         Unavailable
             Some have none after `timeout_s`; the message names them.
         """
-        missing = self._replicas.wait_alive(tuple(stages), timeout_s)
+        missing = self.replicas.wait_alive(tuple(stages), timeout_s)
         if missing:
             raise Unavailable(f"no live {', '.join(missing)} after {timeout_s:g} s", where=self.endpoint)
 
@@ -148,7 +149,7 @@ class _Attempts:
         self.pause_s = FIRST_PAUSE_S
 
     def run(self) -> bytes:
-        replicas, stage = self.bus._replicas, self.endpoint.stage
+        replicas, stage = self.bus.replicas, self.endpoint.stage
         while True:
             instance = self._next_instance()
             try:
@@ -164,16 +165,14 @@ class _Attempts:
             self._pause()
 
     def _next_instance(self) -> str:
-        stage, remaining_s = self.endpoint.stage, self.envelope.remaining_s()
-        wait_s = min(remaining_s, self.bus.patience_s)
-        instance = self.bus._replicas.acquire(stage, self.to_avoid, wait_s) if remaining_s > 0 else None
-        while instance is None:
-            if self.envelope.remaining_s() <= 0:
-                raise DeadlineExceeded(f"no answer {self._history()}", where=stage)
-            if not self.bus.instances(stage):
-                raise Unavailable(f"has no live replica on {self.bus.endpoint} {self._history()}", where=stage)
-            instance = self.bus._replicas.acquire(stage, self.to_avoid, self.envelope.remaining_s())
-        return instance
+        replicas, stage = self.bus.replicas, self.endpoint.stage
+        while (remaining_s := self.envelope.remaining_s()) > 0:
+            instance = replicas.acquire(stage, self.to_avoid, min(remaining_s, LOOK_ROUND_S))
+            if instance is not None:
+                return instance
+            if replicas.missing_s(stage) > self.bus.patience_s:
+                raise Unavailable(f"has no live replica at {self.bus.endpoint}, {self._history()}", where=stage)
+        raise DeadlineExceeded(f"no answer {self._history()}", where=stage)
 
     def _ask(self, instance: str) -> bytes:
         key = self.endpoint.instance_key(instance)

@@ -25,6 +25,8 @@ class Replicas:
         self._outstanding: Counter[tuple[str, str]] = Counter()
         self._asked: dict[tuple[str, str], int] = {}
         self._turns = itertools.count()
+        self._started = time.monotonic()
+        self._missing_since: dict[str, float] = {}
 
     def update(self, stage: str, instance: str, alive: bool) -> None:
         """Note that a replica has come or gone."""
@@ -33,11 +35,20 @@ class Replicas:
                 self._alive[stage].add(instance)
             else:
                 self._alive[stage].discard(instance)
+                if not self._alive[stage]:
+                    self._missing_since[stage] = time.monotonic()
             self._changed.notify_all()
 
     def alive(self, stage: str) -> tuple[str, ...]:
         with self._changed:
             return tuple(sorted(self._alive[stage]))
+
+    def missing_s(self, stage: str) -> float:
+        """How long a stage has been without a live replica."""
+        with self._changed:
+            if self._alive[stage]:
+                return 0.0
+            return time.monotonic() - self._missing_since.get(stage, self._started)
 
     def wait_alive(self, stages: Collection[str], timeout_s: float) -> tuple[str, ...]:
         """Wait until each of `stages` has a live replica; return those that have none after `timeout_s`."""

@@ -21,7 +21,7 @@ from oxbow.bus.config import DEFAULT_ENDPOINT, router_config
 from oxbow.errors import Unavailable
 from oxbow.lifetime import Lifetime
 
-__all__ = ["RouterProcess", "run_router", "start_router"]
+__all__ = ["RouterProcess", "free_endpoint", "run_router", "start_router"]
 
 _FREE_PORT = ":0"
 _FREE_PORT_TRIES = 5
@@ -78,7 +78,7 @@ def _open(listen: str) -> tuple[zenoh.Session, str]:
     tries = _FREE_PORT_TRIES if listen.endswith(_FREE_PORT) else 1
     while True:
         tries -= 1
-        endpoint = _with_free_port(listen) if listen.endswith(_FREE_PORT) else listen
+        endpoint = free_endpoint(listen) if listen.endswith(_FREE_PORT) else listen
         try:
             return zenoh.open(router_config(endpoint)), endpoint
         except zenoh.ZError as error:
@@ -87,8 +87,8 @@ def _open(listen: str) -> tuple[zenoh.Session, str]:
                 raise Unavailable(f"the router cannot listen: {error}", where=endpoint) from error
 
 
-def _with_free_port(listen: str) -> str:
-    """`listen` with a port of its host that was free a moment ago."""
+def free_endpoint(listen: str = "tcp/127.0.0.1:0") -> str:
+    """`listen` with a port of its host that was free a moment ago in place of 0."""
     address = listen.removesuffix(_FREE_PORT)
     with socket.socket() as probe:
         probe.bind((address.partition("/")[2], 0))

@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
 from typing import Any, Protocol, Self
-from urllib.parse import unquote
 
 import msgspec
 import zenoh
@@ -19,22 +18,19 @@ from zenoh.handlers import Callback
 
 from oxbow.bus.config import DEFAULT_ENDPOINT, client_config
 from oxbow.bus.mailbox import Mailbox
+from oxbow.bus.query import JSON, Query
 from oxbow.errors import Busy, DeadlineExceeded, ErrorReply, Internal, OxbowError, Unavailable
 
 __all__ = [
-    "JSON",
-    "MSGPACK",
     "Audience",
+    "Declared",
     "OnQuery",
     "OnSample",
     "Session",
     "Subscription",
     "error_of",
-    "reply_error",
 ]
 
-JSON = "application/json"
-MSGPACK = "application/msgpack"
 OPEN_ATTEMPT_S = 1.0
 
 OnSample = Callable[[str, bytes], None]
@@ -46,21 +42,24 @@ OnQuery = Callable[[str, dict[str, str], bytes], Iterable[tuple[str, bytes]]]
 _log = logging.getLogger(__name__)
 
 
-class _Declared(Protocol):
+class Declared(Protocol):
+    """Something declared on the bus, which can be taken back."""
+
     def undeclare(self) -> Any: ...
 
 
 class Subscription:
     """Something that receives until it is closed."""
 
-    def __init__(self, declared: Iterable[_Declared], mailbox: Mailbox[Any]) -> None:
+    def __init__(self, declared: Iterable[Declared], mailbox: Mailbox[Any]) -> None:
         self._declared = tuple(declared)
         self._mailbox = mailbox
 
     def close(self) -> None:
         """Receive nothing more, and return when all that had been received is dealt with."""
-        for declared in self._declared:
-            declared.undeclare()
+        declared, self._declared = self._declared, ()
+        for each in declared:
+            each.undeclare()
         self._mailbox.close()
 
 
@@ -121,6 +120,8 @@ class Session:
 
     def close(self) -> None:
         """Leave the bus: no longer alive, then nothing more received, then what was received is dealt with."""
+        if self._session.is_closed():
+            return
         for key in tuple(self._tokens):
             self.undeclare_live(key)
         for subscription in self._subscriptions:
@@ -141,15 +142,23 @@ class Session:
             Overtakes other traffic.
         droppable
             Lost rather than waited for on a congested link, and sent after all other traffic.
+
+        Raises
+        ------
+        Unavailable
+            The session is closed.
         """
         priority = zenoh.Priority.INTERACTIVE_HIGH if urgent else zenoh.Priority.DATA
-        self._session.put(
-            key,
-            payload,
-            encoding=encoding,
-            congestion_control=zenoh.CongestionControl.DROP if droppable else zenoh.CongestionControl.BLOCK,
-            priority=zenoh.Priority.DATA_LOW if droppable else priority,
-        )
+        try:
+            self._session.put(
+                key,
+                payload,
+                encoding=encoding,
+                congestion_control=zenoh.CongestionControl.DROP if droppable else zenoh.CongestionControl.BLOCK,
+                priority=zenoh.Priority.DATA_LOW if droppable else priority,
+            )
+        except zenoh.ZError as error:
+            raise Unavailable(f"cannot publish: {error}", where=key) from error
 
     def subscribe(self, key_expr: str, on_sample: OnSample, *, queue_size: int = 1024) -> Subscription:
         """Receive samples, one after another, on a thread of this subscription.
@@ -179,30 +188,33 @@ class Session:
         """
         keys = [key_expr] if isinstance(key_expr, str) else list(key_expr)
 
-        def deliver(query: zenoh.Query) -> None:
+        def deliver(query: Query) -> None:
             with query:
                 try:
-                    for key, reply in on_query(str(query.key_expr), _parameters(query), _payload(query)):
-                        query.reply(key, reply, encoding=JSON)
+                    for key, reply in on_query(query.key, query.parameters, query.payload):
+                        query.reply(key, reply)
                 except OxbowError as error:
-                    reply_error(query, error)
+                    query.fail(error)
                 except Exception as error:  # noqa: BLE001 - becomes an `internal` reply
-                    _log.exception("%s: no answer", query.key_expr)
-                    reply_error(query, Internal(f"{type(error).__name__}: {error}", where=keys[0]))
+                    _log.exception("%s: no answer", query.key)
+                    query.fail(Internal(f"{type(error).__name__}: {error}", where=keys[0]))
 
-        mailbox = Mailbox[zenoh.Query](f"answer {keys[0]}", deliver, size=queue_size, workers=workers)
+        mailbox = Mailbox[Query](f"answer {keys[0]}", deliver, size=queue_size, workers=workers)
 
-        def accept(query: zenoh.Query) -> None:
+        def accept(query: Query) -> None:
             if not mailbox.offer(query):
                 with query:
-                    reply_error(query, Busy(f"{queue_size} queries are waiting; try again later", where=keys[0]))
+                    query.fail(Busy(f"{queue_size} queries are waiting; try again later", where=keys[0]))
 
-        declared = [self.declare_queryable(key, accept) for key in keys]
-        return self._keep(Subscription(declared, mailbox))
+        return self._keep(Subscription([self.declare_queryable(key, accept) for key in keys], mailbox))
 
-    def declare_queryable(self, key: str, accept: Callable[[zenoh.Query], None]) -> zenoh.Queryable[None]:
+    def declare_queryable(self, key: str, accept: Callable[[Query], None]) -> Declared:
         """Receive queries on the network thread: `accept` must hand them on at once."""
-        return self._session.declare_queryable(key, Callback(accept, indirect=False))
+
+        def wrap(query: zenoh.Query) -> None:
+            accept(Query(query))
+
+        return self._session.declare_queryable(key, Callback(wrap, indirect=False))
 
     def query(
         self,
@@ -289,23 +301,9 @@ class Session:
         return subscription
 
 
-def reply_error(query: zenoh.Query, error: OxbowError) -> None:
-    """Answer a query with an error; the JSON encoding tells it from zenoh's own."""
-    query.reply_err(msgspec.json.encode(ErrorReply.of(error)), encoding=JSON)
-
-
 def error_of(reply: zenoh.ReplyError, selector: str, timeout_s: float) -> OxbowError:
     """The exception that an error reply stands for."""
     if str(reply.encoding) == JSON:
         return msgspec.json.decode(reply.payload.to_bytes(), type=ErrorReply).error()
     # Zenoh's own error replies are plain text, and the only one that reaches a caller is its time-out.
     return DeadlineExceeded(f"no answer within {timeout_s:.1f} s ({reply.payload})", where=selector)
-
-
-def _payload(query: zenoh.Query) -> bytes:
-    return query.payload.to_bytes() if query.payload is not None else b""
-
-
-def _parameters(query: zenoh.Query) -> dict[str, str]:
-    pairs = (part.partition("=") for part in str(query.parameters).split(";") if part)
-    return {unquote(name): unquote(value) for name, _, value in pairs}

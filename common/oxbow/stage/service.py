@@ -12,10 +12,10 @@ from pathlib import Path
 from statistics import fmean, quantiles
 
 import msgspec
-import zenoh
 
 from oxbow.bus.mailbox import Mailbox
-from oxbow.bus.session import MSGPACK, Session, reply_error
+from oxbow.bus.query import MSGPACK, Query
+from oxbow.bus.session import Session
 from oxbow.envelope import Envelope
 from oxbow.errors import Busy, DeadlineExceeded, ErrorReply, InvalidMission, OxbowError, Unavailable
 from oxbow.introspection import Info, Ping, Stats
@@ -32,7 +32,7 @@ _log = logging.getLogger(__name__)
 class _Exchange:
     """A request, and the queries that wait for its answer: more than one where a caller asked again."""
 
-    def __init__(self, envelope: Envelope, query: zenoh.Query) -> None:
+    def __init__(self, envelope: Envelope, query: Query) -> None:
         self.envelope = envelope
         self.queries = [query]
 
@@ -83,7 +83,7 @@ class Stage:
         self._queryable.undeclare()
         self.worker.close()
 
-    def _accept(self, query: zenoh.Query) -> None:
+    def _accept(self, query: Query) -> None:
         """Queue a request; on the network thread, so nothing here may take its time."""
         try:
             envelope = self._envelope(query)
@@ -93,16 +93,16 @@ class Stage:
         if answer is not None:
             self._reply(query, answer)
 
-    def _envelope(self, query: zenoh.Query) -> Envelope:
-        size, most = len(query.payload or b""), self.described.most_request_bytes
+    def _envelope(self, query: Query) -> Envelope:
+        size, most = query.size_bytes, self.described.most_request_bytes
         if size > most:
             raise InvalidMission(f"is {size} bytes; at most {most}", where=self.described.stage)
         try:
-            return msgspec.json.decode((query.attachment or zenoh.ZBytes()).to_bytes(), type=Envelope)
+            return msgspec.json.decode(query.attachment, type=Envelope)
         except msgspec.DecodeError as error:
             raise InvalidMission(f"is no Envelope: {error}", where="attachment") from error
 
-    def _enqueue(self, envelope: Envelope, query: zenoh.Query) -> Done | Failed | None:
+    def _enqueue(self, envelope: Envelope, query: Query) -> Done | Failed | None:
         """Wait for the answer to an equal request, or queue a new one; return an answer that is there already."""
         with self._lock:
             same = self._open.get(envelope.request_id)
@@ -121,17 +121,15 @@ class Stage:
 
     def _work(self, exchange: _Exchange) -> None:
         started = time.monotonic()
+        request_id = exchange.envelope.request_id
         try:
             answer = self._answer(exchange)
+            with self._lock:
+                self._answered.put(request_id, answer)
         except OxbowError as error:
             answer = Failed(error=ErrorReply.of(error))
-            lasting = False
-        else:
-            lasting = True
         with self._lock:
-            del self._open[exchange.envelope.request_id]
-            if lasting:
-                self._answered.put(exchange.envelope.request_id, answer)
+            del self._open[request_id]
             self._served += 1
             self._failed += isinstance(answer, Failed)
             self._seconds.append(time.monotonic() - started)
@@ -145,8 +143,8 @@ class Stage:
             raise DeadlineExceeded("not started: the deadline passed in the queue", where=stage)
         if not self.worker.alive():
             self._restart()
-        payload = (exchange.queries[0].payload or zenoh.ZBytes()).to_bytes()
-        job = Job(envelope=envelope, payload=payload, show=bool(envelope.mission_id and self._audience))
+        show = bool(envelope.mission_id and self._audience)
+        job = Job(envelope=envelope, payload=exchange.queries[0].payload, show=show)
         try:
             return self.worker.run(job, self._publish)
         except (WorkerLost, DeadlineExceeded) as error:
@@ -166,12 +164,12 @@ class Stage:
     def _publish(self, shown: Shown) -> None:
         self.session.publish(shown.key, shown.payload, encoding=MSGPACK, droppable=True)
 
-    def _reply(self, query: zenoh.Query, answer: Done | Failed) -> None:
+    def _reply(self, query: Query, answer: Done | Failed) -> None:
         with query:
             if isinstance(answer, Done):
                 query.reply(self.described.instance_key, answer.payload, encoding=MSGPACK)
             else:
-                reply_error(query, answer.error.error())
+                query.fail(answer.error.error())
 
     def _introspect(self, key: str, _parameters: dict[str, str], _payload: bytes) -> Iterator[tuple[str, bytes]]:
         answers = {"ping": self._ping, "info": self._info, "stats": self._stats, "schema": self._schema}

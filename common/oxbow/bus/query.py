@@ -1,0 +1,63 @@
+"""A question from the bus, as its answerer sees it."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Self
+from urllib.parse import unquote
+
+import msgspec
+import zenoh
+
+from oxbow.errors import ErrorReply, OxbowError
+
+__all__ = ["JSON", "MSGPACK", "Query"]
+
+JSON = "application/json"
+MSGPACK = "application/msgpack"
+
+
+class Query:
+    """A query to answer: a context manager, since the asker waits until it is closed."""
+
+    def __init__(self, query: zenoh.Query) -> None:
+        self._query = query
+
+    @property
+    def key(self) -> str:
+        """The key expression that is asked, which may be wider than the answerer's own."""
+        return str(self._query.key_expr)
+
+    @property
+    def parameters(self) -> dict[str, str]:
+        pairs = (part.partition("=") for part in str(self._query.parameters).split(";") if part)
+        return {unquote(name): unquote(value) for name, _, value in pairs}
+
+    @property
+    def size_bytes(self) -> int:
+        """The size of the payload, which is not copied for it."""
+        return 0 if self._query.payload is None else len(self._query.payload)
+
+    @property
+    def payload(self) -> bytes:
+        return b"" if self._query.payload is None else self._query.payload.to_bytes()
+
+    @property
+    def attachment(self) -> bytes:
+        return b"" if self._query.attachment is None else self._query.attachment.to_bytes()
+
+    def reply(self, key: str, payload: bytes, *, encoding: str = JSON) -> None:
+        """Give one reply; `key` must match the one that is asked."""
+        self._query.reply(key, payload, encoding=encoding)
+
+    def fail(self, error: OxbowError) -> None:
+        """Reply an error; its JSON encoding tells it from zenoh's own."""
+        self._query.reply_err(msgspec.json.encode(ErrorReply.of(error)), encoding=JSON)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._query.drop()
