@@ -1,0 +1,190 @@
+"""The commands, their options and their help.
+
+Each command imports what it works with when it runs, so that `--help`, and a client of a stack that is up, do
+not pay for algorithms.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from oxbow_cli.exits import DEBUG
+
+__all__ = ["app"]
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+MissionFile = Annotated[Path, typer.Argument(metavar="FILE", help="The Mission File.", show_default=False)]
+Home = Annotated[
+    Path | None,
+    typer.Option(envvar="OXBOW_HOME", help="Where missions and recordings are kept; else the user's state folder."),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON in place of a table.")]
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print("oxbow", version("oxbow"))
+        raise typer.Exit
+
+
+@app.callback()
+def oxbow(
+    debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks and the services' logs.")] = False,
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Plan coverage missions for survey boats.
+
+    Exit status: 0 done, 2 invalid input, 3 infeasible, 4 unavailable or timed out, 1 a fault of Oxbow's own.
+    """
+    if debug:
+        os.environ[DEBUG] = "1"
+
+
+@app.command()
+def plan(
+    file: MissionFile,
+    method: Annotated[str, typer.Option(help="How to generate the path.")] = "Transect",
+    prior: Annotated[Path | None, typer.Option(help="A prior model of the bloom, for methods that use one.")] = None,
+    connect: Annotated[
+        str | None, typer.Option(metavar="ENDPOINT", help="Plan on the stack that listens there.")
+    ] = None,
+    local: Annotated[bool, typer.Option("--local", help="Plan in this process, without a bus.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The completed Mission File, in place of FILE itself.")
+    ] = None,
+    record: Annotated[
+        Path | None, typer.Option(metavar="FILE.rrd", help="The recording, in place of one under --home.")
+    ] = None,
+    heading: Annotated[
+        float | None, typer.Option(metavar="DEG", help="Of the transects, clockwise from north; else the best.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of all that is random; the same seed gives the same plan.")] = 0,
+    timeout: Annotated[float, typer.Option(metavar="S", help="Give up after so many seconds.")] = 120.0,
+    home: Home = None,
+    json: AsJson = False,
+) -> None:
+    """Plan the path of a Mission File, and complete the file.
+
+    Without `--connect` or `--local`, a router and the services are started for this one plan, as separate
+    processes on a free port, and stopped again. The file is replaced in one step; on any failure it stays as it was.
+
+    Examples:
+
+    - `oxbow plan lake.json`: plan, complete the file, keep a recording
+    - `oxbow plan lake.json -o planned.json --heading 45`
+    - `oxbow plan lake.json --connect tcp/127.0.0.1:7447`: on a stack that `oxbow up` keeps running
+    """
+    from oxbow.mission import read_mission
+    from oxbow_cli import report
+    from oxbow_cli.arguments import plan_options, save
+    from oxbow_cli.planning import planner
+
+    mission = read_mission(file)
+    options = plan_options(method, seed, heading, prior)
+    make_plan = planner(local=local, connect=connect, record=record, home=home)
+    with report.progress_bar(shown=not json) as progress:
+        planned = make_plan(mission, options, timeout, progress)
+    save(output or file, planned.mission)
+    report.print_planned(planned, output or file, json)
+
+
+@app.command()
+def evaluate(file: MissionFile, json: AsJson = False) -> None:
+    """Judge the path in a completed Mission File, whoever made it.
+
+    Measures how well the path covers the water, with certified bounds, and whether it keeps to it.
+
+    Example: `oxbow evaluate lake.json --json`
+    """
+    from oxbow.mission import read_mission
+    from oxbow_cli import report
+    from oxbow_cli.evaluation import evaluate
+
+    found = evaluate(read_mission(file))
+    if json:
+        report.print_json(found)
+    else:
+        report.print_table(report.evaluation_table(file.name, found))
+
+
+@app.command(name="import")
+def import_site(
+    site: Annotated[Path, typer.Argument(metavar="SITE.geojson", help="A polygon in WGS84 degrees.")],
+    launch: Annotated[str, typer.Option(metavar="LAT,LONG", help="Where the vehicle is put in.")],
+    recovery: Annotated[str | None, typer.Option(metavar="LAT,LONG", help="Where it is taken out.")] = None,
+    safety: Annotated[float, typer.Option(help="Least distance from the shore and the zones, m.")] = 0.0,
+    length: Annotated[float, typer.Option(help="Greatest length of the path, m.")] = 20_000.0,
+    spacing: Annotated[float | None, typer.Option(help="Least distance between parallel segments, m.")] = None,
+    name: Annotated[str | None, typer.Option(help="The site's name; else the feature's own.")] = None,
+    part: Annotated[int | None, typer.Option(help="Which polygon, where there are several; from 0.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="In place of stdout.")] = None,
+) -> None:
+    """Make a Mission File from GeoJSON: the exterior is the outline, holes are forbidden zones.
+
+    Example: `oxbow import site.geojson --launch 44.6035,-73.3912 --safety 10 -o lake.json`
+    """
+    from oxbow.contracts import MAX_REQUEST_BYTES
+    from oxbow.files import read_bytes
+    from oxbow.geojson import mission_from_geojson
+    from oxbow.mission import mission_json
+    from oxbow_cli.arguments import position, save
+
+    mission = mission_from_geojson(
+        read_bytes(site, MAX_REQUEST_BYTES),
+        launch=position(launch, "--launch"),
+        recovery=None if recovery is None else position(recovery, "--recovery"),
+        site_name=name,
+        safety_m=safety,
+        length_m=length,
+        minimal_spatial_rate_m=spacing,
+        part=part,
+    )
+    if output is None:
+        print(mission_json(mission).decode(), end="")
+    else:
+        save(output, mission)
+
+
+@app.command()
+def picture(
+    file: MissionFile,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="PNG|SVG", help="The picture to write.")],
+) -> None:
+    """Draw a completed Mission File.
+
+    Example: `oxbow picture lake.json -o lake.png`
+    """
+    from oxbow.mission import read_mission
+    from oxbow_cli.picture import draw
+
+    draw(read_mission(file), output)
+
+
+@app.command()
+def inspect(
+    mission: Annotated[str, typer.Argument(metavar="ID", help="A mission's id, or the path of a recording.")],
+    home: Home = None,
+) -> None:
+    """Open the recording of a mission, stage by stage, in the rerun viewer.
+
+    Example: `oxbow inspect lake-1f00ab42`
+    """
+    from oxbow_cli.home import recordings_folder
+    from oxbow_cli.viewer import find_recording, open_recording
+
+    raise typer.Exit(open_recording(find_recording(mission, recordings_folder(home))))

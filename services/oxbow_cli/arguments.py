@@ -1,0 +1,41 @@
+"""What the command line gives, as what the library takes."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from oxbow.contracts import Method
+from oxbow.errors import InvalidMission
+from oxbow.frame import Position
+from oxbow.mission import Mission, write_mission
+from oxbow.plan import PlanOptions
+
+__all__ = ["plan_options", "position", "save"]
+
+
+def position(text: str, where: str) -> Position:
+    """A position written ``LAT,LONG`` in degrees."""
+    try:
+        lat, long = map(float, text.split(","))
+    except ValueError as error:
+        raise InvalidMission(f"is {text!r}; expected LAT,LONG in degrees, as 44.6,-73.3", where=where) from error
+    return Position(lat=lat, long=long)
+
+
+def plan_options(method: str, seed: int, heading_deg: float | None, prior: Path | None) -> PlanOptions:
+    """How to plan; refuses what no method that there is could use."""
+    if method not in set(Method):
+        raise InvalidMission(f"is {method!r}; expected {' or '.join(Method)}", where="--method")
+    if prior is not None:
+        raise InvalidMission(f"is {str(prior)!r}; {method} plans without a prior model", where="--prior")
+    heading_rad = None if heading_deg is None else math.radians(heading_deg)
+    return PlanOptions(method=Method(method), seed=seed, heading_rad=heading_rad)
+
+
+def save(path: Path, mission: Mission) -> None:
+    """Write a Mission File as a whole, or leave the old one as it was."""
+    try:
+        write_mission(path, mission)
+    except OSError as error:
+        raise InvalidMission(f"cannot be written: {error.strerror or error}", where=str(path)) from error

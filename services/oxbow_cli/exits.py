@@ -1,0 +1,43 @@
+"""How the command ends: one line on stderr for every error, and the exit status that goes with its code."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+
+from oxbow.errors import ErrorCode, OxbowError
+
+__all__ = ["DEBUG", "INTERRUPTED", "exit_status", "explain"]
+
+DEBUG = "OXBOW_DEBUG"
+"""Environment variable that `--debug` sets, for this process and those that it starts."""
+
+INTERRUPTED = 130
+
+_STATUS = {
+    ErrorCode.INVALID_MISSION: 2,
+    ErrorCode.INFEASIBLE: 3,
+    ErrorCode.UNAVAILABLE: 4,
+    ErrorCode.BUSY: 4,
+    ErrorCode.TIMEOUT: 4,
+    ErrorCode.INTERNAL: 1,
+}
+
+
+def exit_status(error: Exception) -> int:
+    """2 invalid input, 3 infeasible, 4 unavailable, busy or timed out, 1 a fault of Oxbow's own."""
+    return _STATUS[error.code] if isinstance(error, OxbowError) else _STATUS[ErrorCode.INTERNAL]
+
+
+def explain(error: Exception) -> None:
+    """Say on stderr what went wrong, in one line; the traceback only where `DEBUG` is set."""
+    debug = DEBUG in os.environ
+    if debug:
+        traceback.print_exception(error)
+    if isinstance(error, OxbowError):
+        text = str(error)
+    else:
+        hint = "" if debug else " (`oxbow --debug ...` tells where)"
+        text = f"internal: {type(error).__name__}: {error}{hint}"
+    print("error:", " ".join(text.split()), file=sys.stderr)

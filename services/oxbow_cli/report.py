@@ -1,0 +1,123 @@
+"""What the command shows: a progress bar on stderr, tables and JSON on stdout."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+from rich.console import Console
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from oxbow.plan import PlanRecord
+    from oxbow_cli.evaluation import Evaluation
+    from oxbow_cli.planning import Progress
+
+__all__ = ["evaluation_table", "plan_table", "print_json", "print_lines", "print_table", "progress_bar"]
+
+Rows = Iterable[tuple[str, str]]
+
+
+def print_json(document: Any) -> None:
+    """Write a document to stdout as indented JSON."""
+    print(msgspec.json.format(msgspec.json.encode(document), indent=2).decode())
+
+
+def print_table(table: Table) -> None:
+    """Write a table to stdout."""
+    Console().print(table)
+
+
+def print_lines(lines: Mapping[str, object]) -> None:
+    """Write where things are, one a line, never wrapped: paths are there to be copied."""
+    width = max(map(len, lines), default=0)
+    for name, value in lines.items():
+        print(f"{name:{width}}  {value}")
+
+
+@contextmanager
+def progress_bar(shown: bool) -> Iterator[Progress]:
+    """A bar on stderr while a mission is planned; nothing where `shown` is false or stderr is no terminal."""
+    console = Console(stderr=True)
+    if not (shown and console.is_terminal):
+        yield lambda stage, fraction: None
+        return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415 - 20 ms
+
+    columns = (TextColumn("{task.description:13}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("starting", total=1.0)
+        yield lambda stage, fraction: bar.update(task, description=stage, completed=fraction)
+
+
+def plan_table(site: str, plan: PlanRecord) -> Table:
+    """A plan in the measures that its user asks for first."""
+    certificate = plan.certificate
+    rows = [
+        ("method", f"{plan.method}, seed {plan.seed}"),
+        ("heading", f"{plan.heading_deg % 180:.1f} deg"),
+        ("spacing", f"{plan.spacing_m:.1f} m"),
+        ("length", f"{_length(plan.length_m)} of {_length(plan.max_length_m)} ({_share(plan)})"),
+        ("duration", _duration(plan.duration_s)),
+        ("waypoints", f"{certificate.waypoints}"),
+        ("water covered", f"{certificate.judged_area:.1%} of {certificate.free_area_m2 / 1e6:.3f} km2"),
+        *_quality(certificate.cover_radius_m, certificate.least_radius_m, certificate.q, certificate.p95_ratio),
+        ("conforms", _conformance(certificate.is_simple, certificate.outside_m, certificate.unsafe_m)),
+    ]
+    rows += [("dropped", f"{part.area_m2:.0f} m2 at {_place(part.place)}: {part.reason}") for part in plan.dropped]
+    rows += [("warning", warning) for warning in plan.warnings]
+    return _table(f"Plan of {site}", rows)
+
+
+def evaluation_table(site: str, found: Evaluation) -> Table:
+    """Every measure of an evaluation, under its name."""
+    rows = []
+    for name, value in msgspec.structs.asdict(found).items():
+        text = _place(value) if name == "worst_gap" and value is not None else _figure(value)
+        rows.append((name, text))
+    return _table(f"Evaluation of {site}", rows)
+
+
+def _table(title: str, rows: Rows) -> Table:
+    table = Table(title=title, show_header=False, title_justify="left", title_style="bold")
+    table.add_column(style="cyan", no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, text in rows:
+        table.add_row(name, text)
+    return table
+
+
+def _quality(radius_m: tuple[float, float], least_m: float, q: float, p95_ratio: float) -> Rows:
+    low_m, high_m = radius_m
+    yield "farthest water", f"{low_m:.1f} to {high_m:.1f} m from the path (any path: {least_m:.1f} m or more)"
+    yield "q", f"{q:.2f} times the least possible radius; 95 % of the water within {p95_ratio:.2f} times"
+
+
+def _conformance(is_simple: bool, outside_m: float, unsafe_m: float) -> str:
+    simple = "never crosses itself" if is_simple else "CROSSES ITSELF"
+    return f"{simple}; {outside_m:.2f} m outside the water, {unsafe_m:.2f} m nearer than Safety"
+
+
+def _share(plan: PlanRecord) -> str:
+    return f"{plan.length_m / plan.max_length_m:.1%}"
+
+
+def _length(length_m: float) -> str:
+    return f"{length_m / 1000:.2f} km"
+
+
+def _duration(duration_s: float) -> str:
+    hours, minutes = divmod(round(duration_s / 60), 60)
+    return f"{hours} h {minutes:02d} min"
+
+
+def _place(place: Any) -> str:
+    return f"{place.lat:.6f}, {place.long:.6f}"
+
+
+def _figure(value: Any) -> str:
+    if isinstance(value, tuple):
+        return " .. ".join(map(_figure, value))
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

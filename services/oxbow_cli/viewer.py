@@ -1,0 +1,39 @@
+"""Opening a recording: the viewer is a program of its own, and nothing of it is imported here."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from oxbow.contracts import checked_id
+from oxbow.errors import InvalidMission
+
+__all__ = ["find_recording", "open_recording"]
+
+_SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
+
+
+def find_recording(name: str, folder: Path) -> Path:
+    """The recording of a mission's id, or the file itself where `name` is a path to one."""
+    path = Path(name) if name.endswith(".rrd") else folder / f"{checked_id(name, where='ID')}.rrd"
+    if path.is_file():
+        return path
+    kept = sorted(file.stem for file in path.parent.glob("*.rrd"))
+    there = f"; there are {', '.join(kept)}" if kept else ""
+    raise InvalidMission(f"no recording at {path}{there}", where=name)
+
+
+def open_recording(path: Path) -> int:
+    """Show a recording in the rerun viewer until it is closed; returns the viewer's exit status.
+
+    Without a screen, it only says how to open the recording.
+    """
+    command = [sys.executable, "-m", "rerun", str(path)]
+    print(path)
+    if sys.platform != "darwin" and not any(map(os.environ.get, _SCREENS)):
+        print("no screen here; copy the file to where there is one, and open it with: rerun", path.name)
+        print("or serve it to a browser from here with:", *command, "--serve-web")
+        return 0
+    return subprocess.run(command, check=False).returncode
