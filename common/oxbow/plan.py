@@ -39,7 +39,8 @@ class PlanRecord(Message, frozen=True, kw_only=True):
     """The `Plan` object of a completed Mission File: how the path was made and how good it is.
 
     Transects run along `heading_deg` (clockwise from north). `length_m` is the geodesic length of the
-    waypoints as written. The same mission, options and versions give the same plan.
+    waypoints as written. The same mission, options and versions give the same plan. `mission_id` and `revision`
+    are those that the mission service keeps the plan under; they are None in a plan made without it.
     """
 
     method: Method
