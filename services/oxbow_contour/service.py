@@ -1,0 +1,71 @@
+"""The contour stage: from a site as the mission describes it to the free space."""
+
+from __future__ import annotations
+
+import shapely
+from shapely import Polygon
+
+from oxbow.contracts import ContourRequest, DroppedPart, FreeSpace
+from oxbow.recording import Layer, LayerKind, Show
+from oxbow_contour.free_space import Eroded, default_tolerance_m, erode_water, true_water
+
+__all__ = ["handle"]
+
+
+def handle(request: ContourRequest, show: Show) -> FreeSpace:
+    """Simplify the contours, erode the water by the safety distance, keep the largest part.
+
+    Raises
+    ------
+    Infeasible
+        No water is left; the message names the largest safety distance that would leave some.
+    """
+    show(Layer(stage="contour", name="raw", geometries=(request.outline, *request.zones)))
+    water = true_water(request.outline, request.zones)
+    tolerance_m = request.tolerance_m
+    if tolerance_m is None:
+        tolerance_m = default_tolerance_m(request.safety_m, request.spacing_m)
+    eroded = erode_water(water, request.safety_m, request.spacing_m, tolerance_m)
+    free, *others = eroded.parts
+    home = next(part for part in water if part.contains(free.representative_point()))
+    dropped = tuple(_dropped(part, home) for part in others)
+    _show_result(eroded, dropped, show)
+    return FreeSpace(
+        free=free,
+        water=home,
+        tolerance_m=eroded.simplified.tolerance_m,
+        compression=eroded.simplified.compression,
+        dropped=dropped,
+        warnings=(*eroded.warnings, *_summary(dropped)),
+    )
+
+
+def _dropped(part: Polygon, home: Polygon) -> DroppedPart:
+    place = part.representative_point()
+    barrier = "at this safety distance" if home.contains(place) else "by water at all"
+    return DroppedPart(
+        area_m2=part.area,
+        reason=f"not connected to the largest part {barrier}",
+        place=(place.x, place.y),
+        outline=part,
+    )
+
+
+def _summary(dropped: tuple[DroppedPart, ...]) -> tuple[str, ...]:
+    if not dropped:
+        return ()
+    area = sum(part.area_m2 for part in dropped)
+    return (f"{len(dropped)} parts of the free space, {area:.0f} m2 together, are not connected to the largest",)
+
+
+def _show_result(eroded: Eroded, dropped: tuple[DroppedPart, ...], show: Show) -> None:
+    simplified = eroded.simplified
+    contours = tuple(shapely.boundary(part) for part in simplified.parts)
+    show(Layer(stage="contour", name="simplified", geometries=contours))
+    show(Layer(stage="contour", name="eroded", geometries=(eroded.parts[0],)))
+    if dropped:
+        outlines = tuple(part.outline for part in dropped)
+        labels = tuple(f"{part.area_m2:.0f} m²" for part in dropped)
+        show(Layer(stage="contour", name="dropped", geometries=outlines, labels=labels))
+    figures = {"compression": simplified.compression, "tolerance_m": simplified.tolerance_m}
+    show(Layer(stage="contour", name="figures", kind=LayerKind.SCALARS, scalars=figures))
