@@ -56,3 +56,5 @@ class PlanRecord(Message, frozen=True, kw_only=True):
     versions: dict[str, str]
     warnings: tuple[str, ...] = ()
     dropped: tuple[DroppedWater, ...] = ()
+    mission_id: str | None = None
+    revision: int | None = None
