@@ -302,7 +302,7 @@ class Certificate(Measures, frozen=True, kw_only=True):
     worst_gap: Place | None = None
 
 
-# --------------------------------------------------------------------------- DSS and guidance (JSON)
+# --------------------------------------------------------------------------- DSS and guidance, in JSON
 
 DEFAULT_DEADLINE_S = 120.0
 """Seconds that planning one mission may take, its wait for a free planner not counted."""

@@ -1,0 +1,78 @@
+"""Serves missions on the bus."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import sys
+from pathlib import Path
+
+import platformdirs
+
+from oxbow.bus import DEFAULT_ENDPOINT, Bus
+from oxbow.errors import OxbowError, Unavailable
+from oxbow.lifetime import Lifetime
+from oxbow_mission.planner import Planner
+from oxbow_mission.registry import Registry
+from oxbow_mission.service import MissionService
+from oxbow_mission.store import Store
+
+_log = logging.getLogger("oxbow_mission")
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Serve until told to end; exits with status 4 where another process holds the store."""
+    options = _options(argv)
+    logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s")
+    lifetime = Lifetime(options.parent)
+    try:
+        with Store(options.home) as store:
+            bus = _connect(options.connect, lifetime)
+            if bus is not None:
+                with bus, Registry(store, bus) as registry:
+                    _serve(bus, registry, options, lifetime)
+    except OxbowError as error:
+        _log.error("%s", error)
+        sys.exit(4)
+
+
+def _serve(bus: Bus, registry: Registry, options: argparse.Namespace, lifetime: Lifetime) -> None:
+    Planner(registry, bus, options.workers)
+    MissionService(bus, registry, options.instance)
+    _log.info("serves missions kept in %s", options.home)
+    lifetime.wait()
+
+
+def _connect(endpoint: str, lifetime: Lifetime) -> Bus | None:
+    """Join the bus; waits for a router that is not there yet."""
+    while not lifetime.over:
+        try:
+            return Bus.connect(endpoint, timeout_s=1.0)
+        except Unavailable as error:
+            _log.warning("%s; waiting for it", error)
+    return None
+
+
+def _options(argv: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="oxbow_mission", description="Serve missions on the bus.")
+    parser.add_argument("--connect", default=DEFAULT_ENDPOINT, help="the router's endpoint (default: %(default)s)")
+    parser.add_argument(
+        "--home", type=Path, default=_default_home(), help="where missions are kept (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--workers", type=int, default=4, help="missions planned at the same time (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--instance", default=f"pid{os.getpid()}", help="the name on the bus (default: %(default)s)"
+    )
+    parser.add_argument("--parent", type=int, help="end when this parent process has ended")
+    return parser.parse_args(argv)
+
+
+def _default_home() -> Path:
+    return Path(os.environ.get("OXBOW_HOME") or platformdirs.user_state_path("oxbow"))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,188 @@
+"""Where all missions stand: every change is kept in the store first, and published second."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+import time
+from types import TracebackType
+from typing import Self
+from urllib.parse import quote
+
+import msgspec
+
+from oxbow.bus import Session
+from oxbow.contracts import MissionKey, MissionState, MissionStatus, checked_id, mission_key
+from oxbow.errors import ErrorReply, InvalidMission, OxbowError, Unavailable
+from oxbow.submission import Submission
+from oxbow_mission.store import Job, Request, Revision, Store
+
+__all__ = ["Registry"]
+
+
+class Registry:
+    """The missions, for the threads that take them in, plan them and wait for them.
+
+    One lock orders all changes, so statuses are published in the order in which they came about.
+
+    Parameters
+    ----------
+    store
+        Where they are kept.
+    bus
+        Where they are published.
+    """
+
+    def __init__(self, store: Store, bus: Session) -> None:
+        self.store = store
+        self.bus = bus
+        self._changed = threading.Condition()
+        self._running: dict[Revision, MissionStatus] = {}
+        self._closed = False
+
+    def __enter__(self) -> Self:
+        for status in self.store.unannounced():
+            self._announce(status)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Change nothing any more: what is being planned waits in the store for another time."""
+        with self._changed:
+            self._closed = True
+            for revision in self._running:
+                self.store.release(revision)
+            self._running.clear()
+            self._changed.notify_all()
+
+    @property
+    def closed(self) -> bool:
+        return self._closed
+
+    # ----------------------------------------------------------------- taking in
+
+    def accept(self, submission: Submission) -> MissionStatus:
+        """Take in a checked mission; the status of a new revision, or of the one that is the same."""
+        parameters = msgspec.json.encode(submission.parameters)
+        request = Request(submission.document, parameters, submission.fingerprint)
+        with self._changed:
+            status = self.store.accept(submission.mission_id, request)
+            if status.state is MissionState.ACCEPTED:
+                self._publish_status(status)
+                self._changed.notify_all()
+            return self._running.get(Revision.of(status), status)
+
+    def refuse(self, mission_id: str, document: bytes, error: OxbowError) -> None:
+        """Let it be known that a request was invalid: its sender may be listening to the status alone.
+
+        An id that cannot be kept is answered under its percent-encoded form.
+        """
+        reply = ErrorReply.of(error)
+        try:
+            checked_id(mission_id)
+        except InvalidMission:
+            status = MissionStatus(
+                mission_id=mission_id, revision=0, state=MissionState.FAILED, error=reply, time_s=time.time()
+            )
+            self._publish_status(status, quote(mission_id, safe=""))
+            return
+        with self._changed:
+            status = self.store.refuse(mission_id, hashlib.sha256(document).hexdigest(), error)
+            self._announce(status)
+
+    # ----------------------------------------------------------------- planning
+
+    def claim(self) -> Job | None:
+        """Wait for a revision to plan, and take it; None once the registry is closed."""
+        with self._changed:
+            while not self._closed:
+                job = self.store.claim()
+                if job is not None:
+                    self._note_progress(job, "", 0.0)
+                    return job
+                self._changed.wait()
+        return None
+
+    def note_progress(self, job: Job, stage: str, fraction: float) -> None:
+        """Publish which stage is at work; this is not kept, since after a crash it is no longer so."""
+        with self._changed:
+            if not self._closed:
+                self._note_progress(job, stage, fraction)
+
+    def _note_progress(self, job: Job, stage: str, fraction: float) -> None:
+        status = MissionStatus(
+            mission_id=job.revision.mission_id,
+            revision=job.revision.number,
+            state=MissionState.PLANNING,
+            stage=stage,
+            fraction=fraction,
+            time_s=time.time(),
+        )
+        self._running[job.revision] = status
+        self._publish_status(status)
+
+    def finish(self, job: Job, plan: bytes) -> None:
+        """Keep and publish a plan, a completed Mission File."""
+        with self._changed:
+            if not self._closed:
+                self._settle(self.store.finish(job.revision, plan))
+
+    def fail(self, job: Job, error: OxbowError) -> None:
+        """Keep and publish why there is no plan."""
+        with self._changed:
+            if not self._closed:
+                self._settle(self.store.fail(job.revision, error))
+
+    def _settle(self, status: MissionStatus) -> None:
+        del self._running[Revision.of(status)]
+        self._announce(status)
+        self._changed.notify_all()
+
+    # ----------------------------------------------------------------- publishing
+
+    def _announce(self, status: MissionStatus) -> None:
+        """Publish an outcome, its plan before its status, and note that this was done."""
+        if status.state is MissionState.DONE:
+            plan = self.store.plan(Revision.of(status))
+            self.bus.publish(mission_key(status.mission_id, "plan"), plan)
+            if is_replan(status.revision):
+                self.bus.publish(mission_key(status.mission_id, "replan"), plan)
+        self._publish_status(status)
+        self.store.mark_announced(Revision.of(status))
+
+    def _publish_status(self, status: MissionStatus, chunk: str | None = None) -> None:
+        key = MissionKey(chunk or status.mission_id, "status")
+        self.bus.publish(str(key), msgspec.json.encode(status))
+
+    # ----------------------------------------------------------------- asking
+
+    def wait_final(self, status: MissionStatus) -> MissionStatus:
+        """Wait until a revision is done or failed.
+
+        Raises
+        ------
+        Unavailable
+            The service stops before; the revision is kept, and asking again continues with it.
+        """
+        with self._changed:
+            while not status.state.is_final:
+                if self._closed:
+                    raise Unavailable("the mission service is stopping; ask again", where="mission")
+                self._changed.wait()
+                status = self.store.status(Revision.of(status))
+        return status
+
+    def statuses(self, mission_id: str | None) -> list[MissionStatus]:
+        """The status of one mission's latest revision, or of each mission's."""
+        with self._changed:
+            kept = self.store.statuses(mission_id)
+            return [self._running.get(Revision.of(status), status) for status in kept]
+
+
+def is_replan(revision: int) -> bool:
+    """Whether a revision's plan takes the place of what guidance may be following already."""
+    return revision > 1

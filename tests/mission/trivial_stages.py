@@ -1,0 +1,94 @@
+"""The four stages in one process on the real bus, with trivial answers: what the path stage does is in the seed."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from shapely import LineString
+
+from oxbow import codec
+from oxbow.bus import Session
+from oxbow.contracts import (
+    CERTIFY,
+    CONTOUR,
+    DECOMPOSE,
+    PATH,
+    Certificate,
+    CertifyRequest,
+    ContourRequest,
+    Decomposition,
+    DecomposeRequest,
+    FreeSpace,
+    Message,
+    PathPlan,
+    PathRequest,
+)
+from oxbow.errors import Infeasible
+from oxbow.lifetime import Lifetime
+
+INFEASIBLE_SEED = 1_000_001
+BROKEN_SEED = 1_000_002
+"""Any other seed is the time that a path takes, in milliseconds."""
+
+
+def contour(request: ContourRequest) -> FreeSpace:
+    return FreeSpace(free=request.outline, water=request.outline, tolerance_m=1.0, compression=1.0)
+
+
+def decompose(_request: DecomposeRequest) -> Decomposition:
+    return Decomposition(heading_rad=0.0, cells=(), critical_points=())
+
+
+def path(request: PathRequest) -> PathPlan:
+    if request.seed == INFEASIBLE_SEED:
+        raise Infeasible("no water is left", where="path")
+    if request.seed == BROKEN_SEED:
+        raise ZeroDivisionError("a fault of the stage")
+    time.sleep(request.seed / 1000)
+    (x, y), end = request.launch, request.recovery
+    return PathPlan(path=LineString([(x, y), (x + 10.0, y), end]), spacing_m=10.0, steps=())
+
+
+def certify(request: CertifyRequest) -> Certificate:
+    return Certificate(
+        length_m=request.path.length,
+        duration_s=request.path.length / request.speed_mps,
+        waypoints=len(request.path.coords),
+        is_simple=True,
+        crossings=0,
+        outside_m=0.0,
+        unsafe_m=0.0,
+        components=1,
+        free_area_m2=request.outline.area,
+        judged_area=1.0,
+        cover_radius_m=(1.0, 2.0),
+        least_radius_m=1.0,
+        q=2.0,
+        mean_distance_m=1.0,
+        p95_distance_m=1.0,
+        mean_ratio=1.0,
+        p95_ratio=1.0,
+    )
+
+
+def answering(kind: type[Message], handle: Callable[[Any], Message]) -> Callable[..., Iterator[tuple[str, bytes]]]:
+    def on_query(key: str, _parameters: dict[str, str], payload: bytes) -> Iterator[tuple[str, bytes]]:
+        yield key, codec.encode(handle(codec.decode(payload, kind)))
+
+    return on_query
+
+
+def main(router: str) -> None:
+    lifetime = Lifetime()
+    with Session.connect(router) as session:
+        for endpoint, handle in ((CONTOUR, contour), (DECOMPOSE, decompose), (PATH, path), (CERTIFY, certify)):
+            session.answer(endpoint.instance_key("trivial"), answering(endpoint.request, handle), workers=4)
+            session.declare_live(endpoint.live_key("trivial"))
+        lifetime.wait()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
