@@ -222,6 +222,7 @@ class Session:
         payload: bytes = b"",
         *,
         timeout_s: float,
+        attachment: bytes | None = None,
         all_targets: bool = False,
         may_be_empty: bool = False,
     ) -> list[tuple[str, bytes]]:
@@ -231,6 +232,8 @@ class Session:
         ----------
         selector
             A key expression, with ``?name=value;...`` where there are parameters.
+        attachment
+            What travels beside the payload, as the `Envelope` of a request to a stage.
         all_targets
             Ask everyone who can answer; an error of one does not hide the replies of others.
         may_be_empty
@@ -243,7 +246,9 @@ class Session:
         """
         found: list[tuple[str, bytes]] = []
         failure: OxbowError | None = None
-        for reply in self._get(selector, payload, timeout_s=timeout_s, all_targets=all_targets):
+        for reply in self._get(
+            selector, payload, timeout_s=timeout_s, attachment=attachment, all_targets=all_targets
+        ):
             if reply.ok is not None:
                 found.append((str(reply.ok.key_expr), reply.ok.payload.to_bytes()))
             elif reply.err is not None:

@@ -1,0 +1,231 @@
+"""Sessions and their router: publish, subscribe, answer, query; the router away; leaving."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from bus_processes import end, launch, run_python, wait_gone, wait_until
+from echo_stage import ECHO, SQUARE, Deed, EchoRequest
+
+from oxbow.bus import Bus, BusCall
+from oxbow.bus.router import RouterProcess, free_endpoint, start_router
+from oxbow.contracts import ANY_LAYER
+from oxbow.errors import Busy, DeadlineExceeded, Infeasible, Internal, Unavailable
+
+pytestmark = pytest.mark.processes
+
+
+@pytest.fixture
+def other(router: RouterProcess) -> Iterator[Bus]:
+    with Bus.connect(router.endpoint) as session:
+        yield session
+
+
+def test_samples_arrive_whole_and_in_order(bus: Bus, other: Bus) -> None:
+    arrived: list[tuple[str, bytes]] = []
+    subscription = other.subscribe("test/order/*", lambda key, payload: arrived.append((key, payload)))
+    sent = [(f"test/order/{i % 3}", bytes([i % 256]) * i) for i in range(300)]
+    for key, payload in sent:
+        bus.publish(key, payload)
+    wait_until(lambda: len(arrived) == len(sent))
+    subscription.close()
+    assert arrived == sent
+
+
+def test_a_slow_subscriber_leaves_its_session_responsive(bus: Bus, other: Bus) -> None:
+    released = threading.Event()
+    subscription = other.subscribe("test/slow", lambda _key, _payload: released.wait(20.0), queue_size=4)
+    other.answer("test/quick", lambda key, _parameters, _payload: [(key, b"still here")])
+    for _ in range(600):
+        bus.publish("test/slow", b"x")
+    assert bus.query("test/quick", timeout_s=5.0) == [("test/quick", b"still here")]
+    released.set()
+    subscription.close()
+
+
+def test_a_faulty_subscriber_loses_one_sample_only(bus: Bus, other: Bus) -> None:
+    arrived: list[bytes] = []
+
+    def receive(_key: str, payload: bytes) -> None:
+        if payload == b"bad":
+            raise ValueError("this one")
+        arrived.append(payload)
+
+    other.subscribe("test/faulty", receive)
+    for payload in (b"first", b"bad", b"last"):
+        bus.publish("test/faulty", payload, urgent=True)
+    wait_until(lambda: b"last" in arrived)
+    assert arrived == [b"first", b"last"]
+
+
+def test_an_answer_sees_parameters_and_payload(bus: Bus, other: Bus) -> None:
+    other.answer("test/echo", lambda key, parameters, payload: [(key, f"{parameters} {payload!r}".encode())])
+    [(_, reply)] = bus.query("test/echo?method=Transect;name=a%20lake;flag", b"body", timeout_s=5.0)
+    assert reply.decode() == "{'method': 'Transect', 'name': 'a lake', 'flag': ''} b'body'"
+
+
+def test_one_query_may_have_many_replies_from_many(bus: Bus, other: Bus) -> None:
+    bus.answer("test/all/a", lambda key, _parameters, _payload: [(key, b"1"), (key, b"2")])
+    other.answer("test/all/b", lambda key, _parameters, _payload: [("test/all/b", key.encode())])
+    replies = bus.query("test/all/*", timeout_s=5.0, all_targets=True)
+    assert sorted(payload for _, payload in replies) == [b"1", b"2", b"test/all/*"]
+
+
+@pytest.mark.parametrize(
+    ("raised", "kind", "message"),
+    [
+        (Infeasible("no water", where="Safety"), Infeasible, "Safety: no water"),
+        (KeyError("a fault"), Internal, "KeyError: 'a fault'"),
+    ],
+)
+def test_errors_travel_and_the_fault_is_coded(
+    bus: Bus, other: Bus, raised: Exception, kind: type[Exception], message: str
+) -> None:
+    def refuse(_key: str, _parameters: dict[str, str], _payload: bytes) -> list[tuple[str, bytes]]:
+        raise raised
+
+    subscription = other.answer("test/refuse", refuse)
+    with pytest.raises(kind, match=message):
+        bus.query("test/refuse", timeout_s=5.0)
+    subscription.close()
+
+
+def test_queries_beyond_the_queue_are_answered_busy(bus: Bus, other: Bus) -> None:
+    released, started = threading.Event(), threading.Event()
+
+    def wait(key: str, _parameters: dict[str, str], _payload: bytes) -> list[tuple[str, bytes]]:
+        started.set()
+        released.wait(20.0)
+        return [(key, b"done")]
+
+    other.answer("test/wait", wait, queue_size=1)
+    with ThreadPoolExecutor(2) as pool:
+        first = pool.submit(bus.query, "test/wait", timeout_s=20.0)
+        started.wait(5.0)
+        second = pool.submit(bus.query, "test/wait", timeout_s=20.0)
+        refused = 0
+        while not refused:
+            try:
+                bus.query("test/wait", timeout_s=0.2)
+            except Busy as busy:
+                refused += 1
+                assert "1 queries are waiting" in busy.message
+            except DeadlineExceeded:
+                pass
+        released.set()
+        assert first.result() == second.result() == [("test/wait", b"done")]
+
+
+def test_a_query_nobody_answers(bus: Bus, other: Bus) -> None:
+    with pytest.raises(Unavailable, match="test/nobody: nobody answers"):
+        bus.query("test/nobody", timeout_s=5.0)
+    assert bus.query("test/nobody", timeout_s=5.0, may_be_empty=True) == []
+    released = threading.Event()
+    other.answer("test/silent", lambda _key, _parameters, _payload: [(str(released.wait(20.0)), b"")])
+    with pytest.raises(DeadlineExceeded, match=r"test/silent: no answer within 0\.2 s"):
+        bus.query("test/silent", timeout_s=0.2)
+    released.set()
+
+
+def test_closing_delivers_what_was_received_then_refuses(router: RouterProcess, bus: Bus) -> None:
+    arrived: list[bytes] = []
+    session = Bus.connect(router.endpoint)
+    subscription = session.subscribe("test/close", lambda _key, payload: arrived.append(payload))
+    bus.publish("test/close", b"x")
+    wait_until(lambda: arrived)
+    subscription.close()
+    session.declare_live("oxbow/v1/live/closing/one")
+    wait_until(lambda: bus.instances("closing") == ("one",))
+    session.close()
+    session.close()
+    wait_until(lambda: bus.instances("closing") == ())
+    with pytest.raises(Unavailable, match="closed"):
+        session.publish("test/close", b"y")
+    with pytest.raises(Unavailable, match="closed"):
+        session.query("test/close", timeout_s=1.0)
+
+
+def test_connecting_to_nothing_names_the_endpoint() -> None:
+    with pytest.raises(Unavailable, match=r"tcp/127\.0\.0\.1:9: no router answers there within 0\.3 s"):
+        Bus.connect("tcp/127.0.0.1:9", timeout_s=0.3)
+
+
+def test_ctrl_c_ends_a_program_that_waits_for_the_router() -> None:
+    program = run_python(
+        "from oxbow.bus import Bus; print('on', flush=True); Bus.connect('tcp/127.0.0.1:9', timeout_s=60)"
+    )
+    assert program.stdout is not None
+    with program.stdout:
+        program.stdout.readline()
+        time.sleep(0.2)
+        program.send_signal(signal.SIGINT)
+        assert program.wait(10.0) != 0
+
+
+def test_a_program_that_never_closes_its_bus_still_ends(router: RouterProcess) -> None:
+    program = run_python(
+        "import sys; from oxbow.bus import Bus\n"
+        "bus = Bus.connect(sys.argv[1])\n"
+        "bus.subscribe('test/**', print); bus.answer('test/x', print); bus.declare_live('oxbow/v1/live/a/b')",
+        router.endpoint,
+    )
+    assert program.stdout is not None
+    program.stdout.close()
+    assert program.wait(20.0) == 0
+
+
+def test_services_and_callers_survive_a_restart_of_the_router() -> None:
+    router = start_router(timeout_s=20.0)
+    replica = launch(router.endpoint, "r0")
+    try:
+        with Bus.connect(router.endpoint) as bus:
+            call = BusCall(bus, mission_id="m1", deadline_s=time.time() + 40.0)
+            layers: list[str] = []
+            bus.subscribe(ANY_LAYER, lambda key, _payload: layers.append(key))
+            assert call(ECHO, EchoRequest(text="before", shape=SQUARE)).text == "before"
+            router.process.kill()
+            router.process.wait()
+            with ThreadPoolExecutor(1) as pool:
+                meanwhile = pool.submit(call, ECHO, EchoRequest(text="across", shape=SQUARE))
+                time.sleep(0.2)
+                router = start_router(router.endpoint, timeout_s=20.0)
+                assert meanwhile.result().text == "across"
+            call(ECHO, EchoRequest(shape=SQUARE, deed=Deed.SHOW))
+            wait_until(lambda: len(layers) == 3)
+    finally:
+        end(replica)
+        end(router.process)
+
+
+def test_the_router_ends_on_sigterm_and_with_its_parent() -> None:
+    router = start_router(timeout_s=20.0)
+    router.process.terminate()
+    assert router.process.wait(10.0) == 0
+    parent = run_python(
+        "import time; from oxbow.bus.router import start_router\n"
+        "print(start_router(timeout_s=20.0).process.pid, flush=True)\n"
+        "time.sleep(60)"
+    )
+    assert parent.stdout is not None
+    pid = int(parent.stdout.readline())
+    os.kill(pid, 0)
+    parent.kill()
+    parent.wait()
+    parent.stdout.close()
+    wait_gone(pid)
+
+
+def test_a_taken_port_is_reported(router: RouterProcess) -> None:
+    with pytest.raises(Unavailable, match="the router did not come up"):
+        start_router(router.endpoint, timeout_s=20.0)
+
+
+def test_a_free_endpoint_keeps_the_host() -> None:
+    assert free_endpoint("tcp/127.0.0.1:0").startswith("tcp/127.0.0.1:")
+    assert not free_endpoint().endswith(":0")
