@@ -134,6 +134,8 @@ class _Sweep:
         # An upright shore at the very start of a floor or end of a ceiling faces the neighbour's water.
         floor = floor[np.searchsorted(floor[:, 0], floor[0, 0], side="right") - 1 :]
         ceiling = ceiling[: np.searchsorted(ceiling[:, 0], ceiling[-1, 0]) + 1]
+        # Where the two chains meet, rounded cuts must not cross.
+        ceiling[[0, -1], 1] = np.maximum(ceiling[[0, -1], 1], floor[[0, -1], 1])
         self.cells.append(Cell(floor=floor, ceiling=ceiling, start=cell.start, end=self.met))
         position = self.line.index(cell)
         del self.line[position]

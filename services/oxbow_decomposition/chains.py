@@ -28,6 +28,9 @@ GRID_BITS = 44
 So a straight shore along the transects is upright, not a saw of critical points; no vertex is moved.
 """
 
+SHORTEST_EDGE = 16.0
+"""Vertices within this many steps of the one before them repeat it: the turn at so short an edge is noise."""
+
 TURN_ERROR = 4.0 * 2.0**-53
 """Bound of the relative rounding error of a turn in floating point (Shewchuk 1997, section 4.1)."""
 
@@ -78,10 +81,15 @@ class Chain:
         return self._cut(vertex, int(self.columns.searchsorted(vertex.column, side="left")))
 
     def _cut(self, vertex: Mark, index: int) -> Mark:
-        u0, v0 = self.points[max(index - 1, 0)].tolist()
-        u1, v1 = self.points[min(index, len(self.points) - 1)].tolist()
-        share = (vertex.u - u0) / (u1 - u0) if u0 < vertex.u < u1 else float(vertex.u >= u1)
-        return Mark(vertex.column, vertex.u, v0 * (1.0 - share) + v1 * share, index)
+        before, after = max(index - 1, 0), min(index, len(self.points) - 1)
+        (u0, v0), (u1, v1) = self.points[before].tolist(), self.points[after].tolist()
+        if vertex.column <= self.columns[before]:
+            v = v0
+        elif vertex.column >= self.columns[after]:
+            v = v1
+        else:
+            v = v0 + min(max((vertex.u - u0) / (u1 - u0), 0.0), 1.0) * (v1 - v0)
+        return Mark(vertex.column, vertex.u, v, index)
 
     def between(self, start: Mark, end: Mark) -> FloatArray:
         """The part of the chain from one mark to another, shape (n, 2), u non-decreasing, no point repeated."""
@@ -136,7 +144,7 @@ def extremes(walks: list[FloatArray], heading_rad: float) -> list[Extreme]:
 def _of_walk(planar: FloatArray, heading_rad: float, grid: float) -> Iterator[Extreme]:
     points = to_sweep(planar, heading_rad)
     compared = np.column_stack([np.round(points[:, 0] / grid) * grid, points[:, 1]])
-    new = (compared != np.roll(compared, 1, axis=0)).any(axis=1)
+    new = (np.abs(compared - np.roll(compared, 1, axis=0)) > SHORTEST_EDGE * grid).any(axis=1)
     planar, points, compared = planar[new], points[new], compared[new]
 
     rising = _rising(compared)
