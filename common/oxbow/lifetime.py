@@ -5,9 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import time
 from types import FrameType
 
 __all__ = ["Lifetime"]
+
+ORPHAN_GRACE_S = 2.0
+"""How long a process may take to end in order once its parent is gone: nobody waits for what it still does."""
 
 _PARENT_CHECK_S = 0.25
 
@@ -24,15 +28,23 @@ class Lifetime:
     """
 
     def __init__(self, parent: int | None = None) -> None:
-        self.parent = parent
         self._over = threading.Event()
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._on_signal)
+        if parent is not None:
+            threading.Thread(target=self._follow, args=(parent,), name="lifetime", daemon=True).start()
 
     def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
         if self._over.is_set():
             os._exit(1)
         self._over.set()
+
+    def _follow(self, parent: int) -> None:
+        while os.getppid() == parent:
+            time.sleep(_PARENT_CHECK_S)
+        self._over.set()
+        time.sleep(ORPHAN_GRACE_S)
+        os._exit(1)
 
     def end(self) -> None:
         """End for a reason of one's own."""
@@ -40,11 +52,8 @@ class Lifetime:
 
     @property
     def over(self) -> bool:
-        if self.parent is not None and os.getppid() != self.parent:
-            self._over.set()
         return self._over.is_set()
 
     def wait(self) -> None:
         """Return once this process should end."""
-        while not self.over:
-            self._over.wait(_PARENT_CHECK_S if self.parent is not None else None)
+        self._over.wait()

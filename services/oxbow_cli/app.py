@@ -27,7 +27,9 @@ app = typer.Typer(
 MissionFile = Annotated[Path, typer.Argument(metavar="FILE", help="The Mission File.", show_default=False)]
 Home = Annotated[
     Path | None,
-    typer.Option(envvar="OXBOW_HOME", help="Where missions and recordings are kept; else the user's state folder."),
+    typer.Option(
+        envvar="OXBOW_HOME", help="Where missions and recordings are kept; else the user's state folder."
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON in place of a table.")]
 
@@ -59,7 +61,9 @@ def oxbow(
 def plan(
     file: MissionFile,
     method: Annotated[str, typer.Option(help="How to generate the path.")] = "Transect",
-    prior: Annotated[Path | None, typer.Option(help="A prior model of the bloom, for methods that use one.")] = None,
+    prior: Annotated[
+        Path | None, typer.Option(help="A prior model of the bloom, for methods that use one.")
+    ] = None,
     connect: Annotated[
         str | None, typer.Option(metavar="ENDPOINT", help="Plan on the stack that listens there.")
     ] = None,
@@ -73,15 +77,18 @@ def plan(
     heading: Annotated[
         float | None, typer.Option(metavar="DEG", help="Of the transects, clockwise from north; else the best.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of all that is random; the same seed gives the same plan.")] = 0,
-    timeout: Annotated[float, typer.Option(metavar="S", help="Give up after so many seconds.")] = 120.0,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Of all that is random; the same seed gives the same plan.")
+    ] = 0,
+    timeout: Annotated[float, typer.Option(metavar="S", min=0.001, help="Give up after so many seconds.")] = 120.0,
     home: Home = None,
     json: AsJson = False,
 ) -> None:
     """Plan the path of a Mission File, and complete the file.
 
     Without `--connect` or `--local`, a router and the services are started for this one plan, as separate
-    processes on a free port, and stopped again. The file is replaced in one step; on any failure it stays as it was.
+    processes on a free port, and stopped again. The file is replaced in one step; on any failure it stays
+    as it was.
 
     Examples:
 
@@ -91,16 +98,81 @@ def plan(
     """
     from oxbow.mission import read_mission
     from oxbow_cli import report
-    from oxbow_cli.arguments import plan_options, save
-    from oxbow_cli.planning import planner
+    from oxbow_cli.arguments import plan_options, require_compatible, save
+    from oxbow_cli.home import recordings_folder
+    from oxbow_cli.planning import Job, plan_embedded, plan_here, plan_on
 
+    require_compatible(local=local, connect=connect, record=record)
     mission = read_mission(file)
     options = plan_options(method, seed, heading, prior)
-    make_plan = planner(local=local, connect=connect, record=record, home=home)
     with report.progress_bar(shown=not json) as progress:
-        planned = make_plan(mission, options, timeout, progress)
+        job = Job(mission, options, timeout, progress)
+        if local:
+            planned = plan_here(job)
+        elif connect is not None:
+            planned = plan_on(job, connect)
+        else:
+            planned = plan_embedded(job, record, recordings_folder(home))
     save(output or file, planned.mission)
-    report.print_planned(planned, output or file, json)
+    if json:
+        report.print_json(report.plan_document(planned, output or file))
+    else:
+        report.print_plan(planned, output or file)
+
+
+@app.command()
+def up(
+    listen: Annotated[str | None, typer.Option(metavar="ENDPOINT", help="Where the router listens.")] = None,
+    replicas: Annotated[
+        list[str] | None, typer.Option(metavar="STAGE=N", help="Processes of a stage; may be repeated.")
+    ] = None,
+    home: Home = None,
+) -> None:
+    """Start a router and the services, and keep them running until Ctrl-C or SIGTERM.
+
+    A process that dies is started again. Plan on the stack with `oxbow plan --connect`, or with
+    `oxbow.Client` from Python.
+
+    Example: `oxbow up --listen tcp/127.0.0.1:7447 --replicas path=2`
+    """
+    import logging
+
+    from oxbow.bus import DEFAULT_ENDPOINT
+    from oxbow.lifetime import Lifetime
+    from oxbow_cli.arguments import replica_counts
+    from oxbow_cli.home import home_folder, recordings_folder
+    from oxbow_cli.stack import StackSettings, running_stack
+
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s: %(message)s")
+    settings = StackSettings(
+        endpoint=listen or DEFAULT_ENDPOINT,
+        home=home_folder(home),
+        recordings=recordings_folder(home),
+        replicas=replica_counts(replicas or ()),
+    )
+    with running_stack(settings):
+        print("ready:", settings.endpoint, flush=True)
+        Lifetime().wait()
+
+
+@app.command()
+def status(
+    connect: Annotated[str | None, typer.Option(metavar="ENDPOINT", help="Where the router listens.")] = None,
+    json: AsJson = False,
+) -> None:
+    """Show what runs on a stack, and where its missions stand.
+
+    Example: `oxbow status --connect tcp/127.0.0.1:7447`
+    """
+    from oxbow.bus import DEFAULT_ENDPOINT
+    from oxbow_cli import report
+    from oxbow_cli.status import status_of
+
+    found = status_of(connect or DEFAULT_ENDPOINT)
+    if json:
+        report.print_json(found)
+    else:
+        report.print_status(found)
 
 
 @app.command()
@@ -119,7 +191,7 @@ def evaluate(file: MissionFile, json: AsJson = False) -> None:
     if json:
         report.print_json(found)
     else:
-        report.print_table(report.evaluation_table(file.name, found))
+        report.print_evaluation(file.name, found)
 
 
 @app.command(name="import")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 
 from oxbow.contracts import Method
@@ -11,7 +12,7 @@ from oxbow.frame import Position
 from oxbow.mission import Mission, write_mission
 from oxbow.plan import PlanOptions
 
-__all__ = ["plan_options", "position", "save"]
+__all__ = ["plan_options", "position", "replica_counts", "require_compatible", "save"]
 
 
 def position(text: str, where: str) -> Position:
@@ -31,6 +32,28 @@ def plan_options(method: str, seed: int, heading_deg: float | None, prior: Path 
         raise InvalidMission(f"is {str(prior)!r}; {method} plans without a prior model", where="--prior")
     heading_rad = None if heading_deg is None else math.radians(heading_deg)
     return PlanOptions(method=Method(method), seed=seed, heading_rad=heading_rad)
+
+
+def replica_counts(texts: Iterable[str]) -> dict[str, int]:
+    """How many processes of each stage, each written ``STAGE=N``."""
+    counts = {}
+    for text in texts:
+        stage, _, count = text.partition("=")
+        if not count.isdecimal():
+            raise InvalidMission(f"is {text!r}; expected STAGE=N, as path=2", where="--replicas")
+        counts[stage] = int(count)
+    return counts
+
+
+def require_compatible(*, local: bool, connect: str | None, record: Path | None) -> None:
+    """Refuse options that contradict one another."""
+    if local and connect is not None:
+        raise InvalidMission("plans in this process; give one of --local and --connect", where="--local")
+    if record is not None and (local or connect is not None):
+        raise InvalidMission(
+            f"is {str(record)!r}; only a plan with neither --local nor --connect makes its own recording",
+            where="--record",
+        )
 
 
 def save(path: Path, mission: Mission) -> None:

@@ -32,12 +32,9 @@ def exit_status(error: Exception) -> int:
 
 def explain(error: Exception) -> None:
     """Say on stderr what went wrong, in one line; the traceback only where `DEBUG` is set."""
-    debug = DEBUG in os.environ
-    if debug:
+    text = str(error) if isinstance(error, OxbowError) else f"{type(error).__name__}: {error}"
+    if DEBUG in os.environ:
         traceback.print_exception(error)
-    if isinstance(error, OxbowError):
-        text = str(error)
-    else:
-        hint = "" if debug else " (`oxbow --debug ...` tells where)"
-        text = f"internal: {type(error).__name__}: {error}{hint}"
+    elif exit_status(error) == _STATUS[ErrorCode.INTERNAL]:
+        text += " (a fault of Oxbow's own; `oxbow --debug ...` shows more)"
     print("error:", " ".join(text.split()), file=sys.stderr)

@@ -1,20 +1,30 @@
-"""The ways to plan a Mission File: in this process, on a stack that is up, or on one started for the purpose."""
+"""The ways to plan a mission: in this process, on a stack that is up, or on one started for the purpose."""
 
 from __future__ import annotations
 
+import os
+import shutil
 import signal
+import subprocess
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
 from types import FrameType
 from typing import TypeVar
 
-from oxbow.contracts import STAGES, Endpoint, Message
-from oxbow.errors import DeadlineExceeded
+from oxbow.client import Client
+from oxbow.contracts import STAGES, Endpoint, Message, MissionStatus
+from oxbow.errors import DeadlineExceeded, InvalidMission
 from oxbow.mission import Mission
 from oxbow.pipeline import Call, plan_mission
 from oxbow.plan import PlanOptions
+from oxbow_cli.exits import DEBUG
+from oxbow_cli.local import local_call
+from oxbow_cli.stack import StackSettings, free_endpoint, running_stack
 
-__all__ = ["Progress", "plan_here"]
+__all__ = ["Job", "Planned", "Progress", "plan_embedded", "plan_here", "plan_on"]
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
@@ -23,12 +33,75 @@ Progress = Callable[[str, float], None]
 """Called with the stage that is at work and the fraction of the mission that is done."""
 
 
-def plan_here(mission: Mission, options: PlanOptions, timeout_s: float, progress: Progress) -> Mission:
-    """Plan in this process, without a bus."""
-    from oxbow_cli.local import local_call  # noqa: PLC0415 - the algorithms, which a client does not import
+@dataclass(frozen=True)
+class Job:
+    """A mission to plan, how, for how long, and whom to tell how far it is."""
 
-    with _deadline(timeout_s):
-        return plan_mission(mission, options, call=_Reported(local_call(), progress))
+    mission: Mission
+    options: PlanOptions
+    timeout_s: float
+    progress: Progress
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A completed mission, and its recording where there is one in reach."""
+
+    mission: Mission
+    recording: Path | None = None
+
+
+def plan_here(job: Job) -> Planned:
+    """Plan in this process, without a bus and without a recording."""
+    with _deadline(job.timeout_s):
+        call = _Reported(local_call(), job.progress)
+        return Planned(plan_mission(job.mission, job.options, call=call))
+
+
+def plan_on(job: Job, endpoint: str) -> Planned:
+    """Plan on the stack that listens at `endpoint`; its recorder keeps the recording."""
+
+    def note(status: MissionStatus) -> None:
+        job.progress(status.stage or status.state, status.fraction)
+
+    options = job.options
+    with Client(endpoint) as client:
+        planned = client.plan(
+            job.mission,
+            timeout_s=job.timeout_s,
+            on_status=note,
+            method=options.method,
+            seed=options.seed,
+            heading_rad=options.heading_rad,
+        )
+    return Planned(planned)
+
+
+def plan_embedded(job: Job, recording: Path | None, recordings: Path) -> Planned:
+    """Plan on a stack of this command's own, which is stopped afterwards.
+
+    Parameters
+    ----------
+    recording
+        Where the recording goes; where absent, into the folder `recordings` under the mission's id.
+    """
+    _make_folder(recordings if recording is None else recording.parent)
+    with tempfile.TemporaryDirectory(prefix="oxbow-") as folder:
+        settings = StackSettings(endpoint=free_endpoint(), home=Path(folder), recordings=Path(folder))
+        with running_stack(settings, output=None if DEBUG in os.environ else subprocess.DEVNULL):
+            planned = plan_on(job, settings.endpoint).mission
+        # The recorder has closed its file by now.
+        assert planned.plan is not None
+        made = Path(folder) / f"{planned.plan.mission_id}.rrd"
+        return Planned(planned, Path(shutil.move(made, recording or recordings / made.name)))
+
+
+def _make_folder(folder: Path) -> None:
+    """Find out before planning that a recording could not be kept."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidMission(f"cannot be made: {error.strerror}", where=str(folder)) from error
 
 
 class _Reported:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import os
+import shlex
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -13,28 +16,17 @@ from rich.table import Table
 if TYPE_CHECKING:
     from oxbow.plan import PlanRecord
     from oxbow_cli.evaluation import Evaluation
-    from oxbow_cli.planning import Progress
+    from oxbow_cli.planning import Planned, Progress
+    from oxbow_cli.status import Process, StackStatus
 
-__all__ = ["evaluation_table", "plan_table", "print_json", "print_lines", "print_table", "progress_bar"]
+__all__ = ["plan_document", "print_evaluation", "print_json", "print_plan", "print_status", "progress_bar"]
 
 Rows = Iterable[tuple[str, str]]
 
 
 def print_json(document: Any) -> None:
     """Write a document to stdout as indented JSON."""
-    print(msgspec.json.format(msgspec.json.encode(document), indent=2).decode())
-
-
-def print_table(table: Table) -> None:
-    """Write a table to stdout."""
-    Console().print(table)
-
-
-def print_lines(lines: Mapping[str, object]) -> None:
-    """Write where things are, one a line, never wrapped: paths are there to be copied."""
-    width = max(map(len, lines), default=0)
-    for name, value in lines.items():
-        print(f"{name:{width}}  {value}")
+    print(msgspec.json.format(msgspec.json.encode(document, enc_hook=os.fspath), indent=2).decode())
 
 
 @contextmanager
@@ -42,7 +34,7 @@ def progress_bar(shown: bool) -> Iterator[Progress]:
     """A bar on stderr while a mission is planned; nothing where `shown` is false or stderr is no terminal."""
     console = Console(stderr=True)
     if not (shown and console.is_terminal):
-        yield lambda stage, fraction: None
+        yield lambda _stage, _fraction: None
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415 - 20 ms
 
@@ -52,7 +44,23 @@ def progress_bar(shown: bool) -> Iterator[Progress]:
         yield lambda stage, fraction: bar.update(task, description=stage, completed=fraction)
 
 
-def plan_table(site: str, plan: PlanRecord) -> Table:
+def plan_document(planned: Planned, file: Path) -> dict[str, Any]:
+    """What `--json` prints of a plan."""
+    return {"file": file, "recording": planned.recording, "Plan": planned.mission.plan}
+
+
+def print_plan(planned: Planned, file: Path) -> None:
+    """Write a plan's table to stdout, and where its files are: one a line, never wrapped, to be copied."""
+    plan = planned.mission.plan
+    assert plan is not None
+    Console().print(_plan_table(planned.mission.site_name or file.name, plan))
+    print("mission file", file, sep="  ")
+    if planned.recording is not None:
+        print("recording   ", planned.recording, sep="  ")
+        print("open it with", f"oxbow inspect {shlex.quote(str(planned.recording))}", sep="  ")
+
+
+def _plan_table(site: str, plan: PlanRecord) -> Table:
     """A plan in the measures that its user asks for first."""
     certificate = plan.certificate
     rows = [
@@ -71,13 +79,60 @@ def plan_table(site: str, plan: PlanRecord) -> Table:
     return _table(f"Plan of {site}", rows)
 
 
-def evaluation_table(site: str, found: Evaluation) -> Table:
-    """Every measure of an evaluation, under its name."""
+def print_evaluation(site: str, found: Evaluation) -> None:
+    """Write every measure of an evaluation to stdout, under its name."""
     rows = []
     for name, value in msgspec.structs.asdict(found).items():
         text = _place(value) if name == "worst_gap" and value is not None else _figure(value)
         rows.append((name, text))
-    return _table(f"Evaluation of {site}", rows)
+    Console().print(_table(f"Evaluation of {site}", rows))
+
+
+def print_status(found: StackStatus) -> None:
+    """Write a stack's processes and missions to stdout."""
+    processes = Table(title=f"Processes on {found.endpoint}", title_justify="left", title_style="bold")
+    for name in (
+        "service",
+        "instance",
+        "pid",
+        "up",
+        "served",
+        "failed",
+        "busy",
+        "queued",
+        "mean",
+        "p95",
+        "memory",
+    ):
+        processes.add_column(name, justify="left" if name in ("service", "instance") else "right")
+    for process in found.processes:
+        processes.add_row(process.service, process.instance, *_ping_cells(process), *_stats_cells(process))
+    for service in found.missing:
+        processes.add_row(service, "[red]none[/red]")
+    missions = Table(title="Missions", title_justify="left", title_style="bold")
+    for name in ("mission", "revision", "state", "stage", "done", "error"):
+        missions.add_column(name, overflow="fold")
+    for mission in found.missions:
+        error = f"{mission.error.where}: {mission.error.message}" if mission.error else ""
+        done = f"{1.0 if mission.state.is_final else mission.fraction:.0%}"
+        missions.add_row(
+            mission.mission_id, str(mission.revision), mission.state.value, mission.stage, done, error
+        )
+    Console().print(processes, missions)
+
+
+def _ping_cells(process: Process) -> tuple[str, ...]:
+    ping = process.ping
+    return (str(ping.pid), _duration(ping.uptime_s)) if ping else ("", "")
+
+
+def _stats_cells(process: Process) -> tuple[str, ...]:
+    stats = process.stats
+    if stats is None:
+        return ()
+    counts = (stats.served, stats.failed, stats.busy, stats.queued)
+    memory = f"{(stats.session_rss_bytes + stats.worker_rss_bytes) / 2**20:.0f} MiB"
+    return (*map(str, counts), f"{stats.mean_s:.2f} s", f"{stats.p95_s:.2f} s", memory)
 
 
 def _table(title: str, rows: Rows) -> Table:

@@ -5,24 +5,24 @@ from __future__ import annotations
 import os
 import socket
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO
 
 from oxbow.bus import Bus
 from oxbow.contracts import STAGES
 from oxbow.errors import InvalidMission, Unavailable
 from oxbow_cli.supervisor import Supervisor
 
-__all__ = ["StackSettings", "free_endpoint", "running_stack"]
+__all__ = ["SERVICES", "StackSettings", "free_endpoint", "running_stack"]
 
 START_S = 30.0
 """How long a stack may take to come up, on a machine that is busy."""
 
-_ATTENTION_S = 0.1
+_LOOK_S = 0.02
 _STAGES = tuple(endpoint.stage for endpoint in STAGES)
+SERVICES = (*_STAGES, "mission", "recorder")
 
 
 @dataclass(frozen=True)
@@ -55,8 +55,8 @@ class StackSettings:
 
 
 @contextmanager
-def running_stack(settings: StackSettings, output: IO[bytes] | None = None) -> Iterator[Bus]:
-    """A stack that is ready, for as long as the context lasts; yields a session on its bus.
+def running_stack(settings: StackSettings, output: int | None = None) -> Iterator[None]:
+    """A stack that is ready, for as long as the context lasts.
 
     A process that ends is started again. All of them end with the context, or with this process
     however it dies.
@@ -64,7 +64,7 @@ def running_stack(settings: StackSettings, output: IO[bytes] | None = None) -> I
     Parameters
     ----------
     output
-        A file for what the processes log; where absent, this process's stderr.
+        A file descriptor for what the processes log; where absent, this process's stderr.
 
     Raises
     ------
@@ -72,35 +72,38 @@ def running_stack(settings: StackSettings, output: IO[bytes] | None = None) -> I
         A process ended before it was ready, or was not ready after `START_S`.
     """
     with Supervisor(output) as supervisor:
-        _start(supervisor, settings)
+        instances = _start(supervisor, settings)
         with Bus.connect(settings.endpoint, timeout_s=START_S) as bus:
-            _wait_ready(bus, supervisor)
-            supervisor.keep_alive()
-            yield bus
+            _wait_ready(bus, instances, supervisor)
+        supervisor.keep_alive()
+        yield
 
 
-def _start(supervisor: Supervisor, settings: StackSettings) -> None:
-    """Start everything at once: the services wait for the router by themselves."""
+def _start(supervisor: Supervisor, settings: StackSettings) -> list[tuple[str, str]]:
+    """Start everything at once, since the services wait for the router; returns each service and instance."""
     parent = ("--parent", str(os.getpid()))
-    supervisor.start("router", "-m", "oxbow.bus.router", "--listen", settings.endpoint, *parent)
-    common = ("--connect", settings.endpoint, *parent)
-    for stage in _STAGES:
-        for number in range(1, settings.replicas.get(stage, 1) + 1):
+    supervisor.start("router", ["-m", "oxbow.bus.router", "--listen", settings.endpoint, *parent], rank=0)
+    own_options = {"mission": ("--home", settings.home), "recorder": ("--folder", settings.recordings)}
+    started = []
+    for service in SERVICES:
+        for number in range(1, settings.replicas.get(service, 1) + 1):
             instance = f"{os.getpid()}-{number}"
-            supervisor.start(f"{stage}-{number}", "-m", f"oxbow_{stage}", "--instance", instance, *common)
-    supervisor.start("mission", "-m", "oxbow_mission", "--home", str(settings.home), *common)
-    supervisor.start("recorder", "-m", "oxbow_recorder", "--folder", str(settings.recordings), *common)
+            options = ("--connect", settings.endpoint, "--instance", instance, *own_options.get(service, ()))
+            arguments = ["-m", f"oxbow_{service}", *map(str, options), *parent]
+            # The recorder outlives the stages, whose last layers it is to write.
+            supervisor.start(f"{service}-{number}", arguments, rank=1 if service == "recorder" else 2)
+            started.append((service, instance))
+    return started
 
 
-def _wait_ready(bus: Bus, supervisor: Supervisor) -> None:
-    services = (*_STAGES, "mission", "recorder")
+def _wait_ready(bus: Bus, instances: Iterable[tuple[str, str]], supervisor: Supervisor) -> None:
+    """Wait for every process by its own name: another stack's would not do."""
     give_up = time.monotonic() + START_S
-    while missing := [service for service in services if not bus.instances(service)]:
+    while missing := [service for service, instance in instances if instance not in bus.instances(service)]:
         supervisor.require_alive()
         if time.monotonic() > give_up:
             raise Unavailable(f"no live {', '.join(missing)} after {START_S:g} s", where=bus.endpoint)
-        with suppress(Unavailable):
-            bus.wait_ready(missing, _ATTENTION_S)
+        time.sleep(_LOOK_S)
 
 
 def free_endpoint() -> str:

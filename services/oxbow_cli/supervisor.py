@@ -9,14 +9,17 @@ import threading
 import time
 from collections.abc import Sequence
 from types import TracebackType
-from typing import IO, Self
+from typing import Self
 
 from oxbow.errors import Unavailable
 
 __all__ = ["Child", "Supervisor"]
 
-GRACE_S = 2.0
-"""How long a child may take to end of its own accord; then it is killed."""
+GRACE_S = 10.0
+"""How long children may take to end in order; then they are killed."""
+
+HURRIED_GRACE_S = 0.5
+"""The same after an error or Ctrl-C: what they still do is of no use."""
 
 _CHECK_S = 0.1
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.2, 5.0
@@ -36,14 +39,17 @@ class Child:
         What it is called in the log.
     arguments
         Those of this Python interpreter.
+    rank
+        Its place in the order of stopping.
     output
-        A file for all that it prints; where absent, this process's stderr.
+        A file descriptor for all that it prints; where absent, this process's stderr.
     """
 
-    def __init__(self, name: str, arguments: Sequence[str], output: IO[bytes] | None) -> None:
+    def __init__(self, name: str, arguments: Sequence[str], rank: int, output: int | None) -> None:
         self.name = name
+        self.rank = rank
         self._command = [sys.executable, *arguments]
-        self._output = sys.stderr if output is None else output
+        self._output = sys.stderr.fileno() if output is None else output
         self._pause_s = _FIRST_PAUSE_S
         self._start()
 
@@ -88,15 +94,15 @@ class Supervisor:
     Children that should not outlive a supervisor that is killed have to notice its death themselves.
     """
 
-    def __init__(self, output: IO[bytes] | None = None) -> None:
+    def __init__(self, output: int | None = None) -> None:
         self.children: list[Child] = []
         self._output = output
         self._closing = threading.Event()
         self._watch = threading.Thread(target=self._revive, name="supervisor", daemon=True)
 
-    def start(self, name: str, *arguments: str) -> None:
-        """Start a child of this Python interpreter."""
-        self.children.append(Child(name, arguments, self._output))
+    def start(self, name: str, arguments: Sequence[str], rank: int) -> None:
+        """Start a child; those of the highest rank are stopped first."""
+        self.children.append(Child(name, arguments, rank, self._output))
 
     def require_alive(self) -> None:
         """Raise `Unavailable` where a child has ended."""
@@ -120,16 +126,16 @@ class Supervisor:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        self.close(GRACE_S if error is None else HURRIED_GRACE_S)
 
-    def close(self) -> None:
-        """Stop all children, the one started first last of all: the others may need it to leave in order."""
+    def close(self, grace_s: float) -> None:
+        """Stop all children, those that others need to leave in order last."""
         self._closing.set()
         if self._watch.is_alive():
             self._watch.join()
-        first, others = self.children[:1], self.children[1:]
-        for group in (others, first):
-            give_up = time.monotonic() + GRACE_S
+        for rank in sorted({child.rank for child in self.children}, reverse=True):
+            group = [child for child in self.children if child.rank == rank]
+            give_up = time.monotonic() + grace_s
             for child in group:
                 child.process.terminate()
             for child in group:
