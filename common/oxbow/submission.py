@@ -7,7 +7,7 @@ import importlib.metadata
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from urllib.parse import quote
 
 import msgspec
@@ -87,7 +87,7 @@ class Submission:
     def fingerprint(self) -> str:
         """Equal for two submissions that this version of Oxbow gives the same plan."""
         options = msgspec.structs.replace(self.parameters, id=None, deadline_s=DEFAULT_DEADLINE_S)
-        digest = hashlib.sha256(importlib.metadata.version("oxbow").encode())
+        digest = hashlib.sha256(_version().encode())
         digest.update(msgspec.json.encode(options))
         digest.update(self.document)
         return digest.hexdigest()
@@ -99,3 +99,8 @@ class Submission:
             return self.parameters.id
         name = re.sub(r"[^A-Za-z0-9_.-]+", "-", self.mission.site_name or "")[:MOST_NAME_CHARACTERS]
         return f"{name.strip('-') or 'mission'}-{self.fingerprint[:8]}"
+
+
+@cache
+def _version() -> str:
+    return importlib.metadata.version("oxbow")

@@ -1,12 +1,13 @@
-"""The four stages in one process on the real bus, with trivial answers: what the path stage does is in the seed."""
+"""The four stages in one process on the real bus, with trivial answers; the seed says what becomes of a path."""
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from mission_files import BROKEN_SEED, INFEASIBLE_SEED
 from shapely import LineString
 
 from oxbow import codec
@@ -19,8 +20,8 @@ from oxbow.contracts import (
     Certificate,
     CertifyRequest,
     ContourRequest,
-    Decomposition,
     DecomposeRequest,
+    Decomposition,
     FreeSpace,
     Message,
     PathPlan,
@@ -28,10 +29,6 @@ from oxbow.contracts import (
 )
 from oxbow.errors import Infeasible
 from oxbow.lifetime import Lifetime
-
-INFEASIBLE_SEED = 1_000_001
-BROKEN_SEED = 1_000_002
-"""Any other seed is the time that a path takes, in milliseconds."""
 
 
 def contour(request: ContourRequest) -> FreeSpace:
@@ -81,9 +78,13 @@ def answering(kind: type[Message], handle: Callable[[Any], Message]) -> Callable
     return on_query
 
 
-def main(router: str) -> None:
-    lifetime = Lifetime()
-    with Session.connect(router) as session:
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--connect", required=True)
+    parser.add_argument("--parent", type=int)
+    options = parser.parse_args()
+    lifetime = Lifetime(options.parent)
+    with Session.connect(options.connect) as session:
         for endpoint, handle in ((CONTOUR, contour), (DECOMPOSE, decompose), (PATH, path), (CERTIFY, certify)):
             session.answer(endpoint.instance_key("trivial"), answering(endpoint.request, handle), workers=4)
             session.declare_live(endpoint.live_key("trivial"))
@@ -91,4 +92,4 @@ def main(router: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main()
