@@ -13,7 +13,7 @@ __all__ = ["Lifetime"]
 ORPHAN_GRACE_S = 2.0
 """How long a process may take to end in order once its parent is gone: nobody waits for what it still does."""
 
-_PARENT_CHECK_S = 0.25
+_SLICE_S = 0.25
 
 
 class Lifetime:
@@ -41,7 +41,7 @@ class Lifetime:
 
     def _follow(self, parent: int) -> None:
         while os.getppid() == parent:
-            time.sleep(_PARENT_CHECK_S)
+            time.sleep(_SLICE_S)
         self._over.set()
         time.sleep(ORPHAN_GRACE_S)
         os._exit(1)
@@ -56,4 +56,6 @@ class Lifetime:
 
     def wait(self) -> None:
         """Return once this process should end."""
-        self._over.wait()
+        # In slices: a signal that a thread of zenoh's takes does not wake the main thread.
+        while not self._over.wait(_SLICE_S):
+            pass

@@ -6,6 +6,7 @@ import os
 import signal
 import threading
 import time
+import uuid
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
@@ -15,7 +16,7 @@ from echo_stage import ECHO, SQUARE, Deed, EchoRequest
 
 from oxbow.bus import Bus, BusCall
 from oxbow.bus.router import RouterProcess, free_endpoint, start_router
-from oxbow.contracts import ANY_LAYER
+from oxbow.contracts import ANY_LAYER, live_key
 from oxbow.errors import Busy, DeadlineExceeded, Infeasible, Internal, Unavailable
 
 pytestmark = pytest.mark.processes
@@ -27,9 +28,17 @@ def other(router: RouterProcess) -> Iterator[Bus]:
         yield session
 
 
+def ready(session: Bus, caller: Bus) -> None:
+    """Wait until `caller` sees a token of `session`, and so what `session` declared before it."""
+    name = uuid.uuid4().hex
+    session.declare_live(live_key("test", name))
+    wait_until(lambda: name in caller.instances("test"))
+
+
 def test_samples_arrive_whole_and_in_order(bus: Bus, other: Bus) -> None:
     arrived: list[tuple[str, bytes]] = []
     subscription = other.subscribe("test/order/*", lambda key, payload: arrived.append((key, payload)))
+    ready(other, bus)
     sent = [(f"test/order/{i % 3}", bytes([i % 256]) * i) for i in range(300)]
     for key, payload in sent:
         bus.publish(key, payload)
@@ -42,6 +51,7 @@ def test_a_slow_subscriber_leaves_its_session_responsive(bus: Bus, other: Bus) -
     released = threading.Event()
     subscription = other.subscribe("test/slow", lambda _key, _payload: released.wait(20.0), queue_size=4)
     other.answer("test/quick", lambda key, _parameters, _payload: [(key, b"still here")])
+    ready(other, bus)
     for _ in range(600):
         bus.publish("test/slow", b"x")
     assert bus.query("test/quick", timeout_s=5.0) == [("test/quick", b"still here")]
@@ -58,6 +68,7 @@ def test_a_faulty_subscriber_loses_one_sample_only(bus: Bus, other: Bus) -> None
         arrived.append(payload)
 
     other.subscribe("test/faulty", receive)
+    ready(other, bus)
     for payload in (b"first", b"bad", b"last"):
         bus.publish("test/faulty", payload, urgent=True)
     wait_until(lambda: b"last" in arrived)
@@ -66,6 +77,7 @@ def test_a_faulty_subscriber_loses_one_sample_only(bus: Bus, other: Bus) -> None
 
 def test_an_answer_sees_parameters_and_payload(bus: Bus, other: Bus) -> None:
     other.answer("test/echo", lambda key, parameters, payload: [(key, f"{parameters} {payload!r}".encode())])
+    ready(other, bus)
     [(_, reply)] = bus.query("test/echo?method=Transect;name=a%20lake;flag", b"body", timeout_s=5.0)
     assert reply.decode() == "{'method': 'Transect', 'name': 'a lake', 'flag': ''} b'body'"
 
@@ -73,6 +85,7 @@ def test_an_answer_sees_parameters_and_payload(bus: Bus, other: Bus) -> None:
 def test_one_query_may_have_many_replies_from_many(bus: Bus, other: Bus) -> None:
     bus.answer("test/all/a", lambda key, _parameters, _payload: [(key, b"1"), (key, b"2")])
     other.answer("test/all/b", lambda key, _parameters, _payload: [("test/all/b", key.encode())])
+    ready(other, bus)
     replies = bus.query("test/all/*", timeout_s=5.0, all_targets=True)
     assert sorted(payload for _, payload in replies) == [b"1", b"2", b"test/all/*"]
 
@@ -91,6 +104,7 @@ def test_errors_travel_and_the_fault_is_coded(
         raise raised
 
     subscription = other.answer("test/refuse", refuse)
+    ready(other, bus)
     with pytest.raises(kind, match=message):
         bus.query("test/refuse", timeout_s=5.0)
     subscription.close()
@@ -105,21 +119,18 @@ def test_queries_beyond_the_queue_are_answered_busy(bus: Bus, other: Bus) -> Non
         return [(key, b"done")]
 
     other.answer("test/wait", wait, queue_size=1)
-    with ThreadPoolExecutor(2) as pool:
+    ready(other, bus)
+    with ThreadPoolExecutor(4) as pool:
         first = pool.submit(bus.query, "test/wait", timeout_s=20.0)
-        started.wait(5.0)
-        second = pool.submit(bus.query, "test/wait", timeout_s=20.0)
-        refused = 0
-        while not refused:
-            try:
-                bus.query("test/wait", timeout_s=0.2)
-            except Busy as busy:
-                refused += 1
-                assert "1 queries are waiting" in busy.message
-            except DeadlineExceeded:
-                pass
+        started.wait(20.0)
+        others = [pool.submit(bus.query, "test/wait", timeout_s=20.0) for _ in range(3)]
+        wait_until(lambda: sum(other.done() for other in others) == 2)
         released.set()
-        assert first.result() == second.result() == [("test/wait", b"done")]
+        failures = [query.exception() for query in others]
+        assert first.result() == [("test/wait", b"done")]
+    assert failures.count(None) == 1
+    busy = [failure for failure in failures if failure is not None]
+    assert all(isinstance(failure, Busy) and "1 queries are waiting" in failure.message for failure in busy)
 
 
 def test_a_query_nobody_answers(bus: Bus, other: Bus) -> None:
@@ -128,6 +139,7 @@ def test_a_query_nobody_answers(bus: Bus, other: Bus) -> None:
     assert bus.query("test/nobody", timeout_s=5.0, may_be_empty=True) == []
     released = threading.Event()
     other.answer("test/silent", lambda _key, _parameters, _payload: [(str(released.wait(20.0)), b"")])
+    ready(other, bus)
     with pytest.raises(DeadlineExceeded, match=r"test/silent: no answer within 0\.2 s"):
         bus.query("test/silent", timeout_s=0.2)
     released.set()
@@ -137,11 +149,11 @@ def test_closing_delivers_what_was_received_then_refuses(router: RouterProcess, 
     arrived: list[bytes] = []
     session = Bus.connect(router.endpoint)
     subscription = session.subscribe("test/close", lambda _key, payload: arrived.append(payload))
+    session.declare_live(live_key("closing", "one"))
+    wait_until(lambda: bus.instances("closing") == ("one",))
     bus.publish("test/close", b"x")
     wait_until(lambda: arrived)
     subscription.close()
-    session.declare_live("oxbow/v1/live/closing/one")
-    wait_until(lambda: bus.instances("closing") == ("one",))
     session.close()
     session.close()
     wait_until(lambda: bus.instances("closing") == ())
