@@ -12,6 +12,7 @@ from typing import Annotated
 
 import typer
 
+from oxbow.bus import DEFAULT_ENDPOINT
 from oxbow_cli.exits import DEBUG
 
 __all__ = ["app"]
@@ -98,7 +99,7 @@ def plan(
     """
     from oxbow.mission import read_mission
     from oxbow_cli import report
-    from oxbow_cli.arguments import plan_options, require_compatible, save
+    from oxbow_cli.arguments import endpoint, plan_options, require_compatible, save
     from oxbow_cli.home import recordings_folder
     from oxbow_cli.planning import Job, plan_embedded, plan_here, plan_on
 
@@ -110,7 +111,7 @@ def plan(
         if local:
             planned = plan_here(job)
         elif connect is not None:
-            planned = plan_on(job, connect)
+            planned = plan_on(job, endpoint(connect, "--connect"))
         else:
             planned = plan_embedded(job, record, recordings_folder(home))
     save(output or file, planned.mission)
@@ -122,7 +123,7 @@ def plan(
 
 @app.command()
 def up(
-    listen: Annotated[str | None, typer.Option(metavar="ENDPOINT", help="Where the router listens.")] = None,
+    listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where the router listens.")] = DEFAULT_ENDPOINT,
     replicas: Annotated[
         list[str] | None, typer.Option(metavar="STAGE=N", help="Processes of a stage; may be repeated.")
     ] = None,
@@ -137,15 +138,14 @@ def up(
     """
     import logging
 
-    from oxbow.bus import DEFAULT_ENDPOINT
     from oxbow.lifetime import Lifetime
-    from oxbow_cli.arguments import replica_counts
+    from oxbow_cli.arguments import endpoint, replica_counts
     from oxbow_cli.home import home_folder, recordings_folder
     from oxbow_cli.stack import StackSettings, running_stack
 
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s: %(message)s")
     settings = StackSettings(
-        endpoint=listen or DEFAULT_ENDPOINT,
+        endpoint=endpoint(listen, "--listen"),
         home=home_folder(home),
         recordings=recordings_folder(home),
         replicas=replica_counts(replicas or ()),
@@ -157,18 +157,18 @@ def up(
 
 @app.command()
 def status(
-    connect: Annotated[str | None, typer.Option(metavar="ENDPOINT", help="Where the router listens.")] = None,
+    connect: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where the router listens.")] = DEFAULT_ENDPOINT,
     json: AsJson = False,
 ) -> None:
     """Show what runs on a stack, and where its missions stand.
 
     Example: `oxbow status --connect tcp/127.0.0.1:7447`
     """
-    from oxbow.bus import DEFAULT_ENDPOINT
     from oxbow_cli import report
+    from oxbow_cli.arguments import endpoint
     from oxbow_cli.status import status_of
 
-    found = status_of(connect or DEFAULT_ENDPOINT)
+    found = status_of(endpoint(connect, "--connect"))
     if json:
         report.print_json(found)
     else:

@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
+from oxbow.bus import DEFAULT_ENDPOINT
 from oxbow.contracts import Method
 from oxbow.errors import InvalidMission
 from oxbow.frame import Position
 from oxbow.mission import Mission, write_mission
 from oxbow.plan import PlanOptions
 
-__all__ = ["plan_options", "position", "replica_counts", "require_compatible", "save"]
+__all__ = ["endpoint", "plan_options", "position", "replica_counts", "require_compatible", "save"]
+
+
+_ENDPOINT = re.compile(r"[a-z][a-z0-9_-]*/\S+")
+
+
+def endpoint(text: str, where: str) -> str:
+    """Where a router listens, as ``tcp/HOST:PORT``."""
+    if not _ENDPOINT.fullmatch(text):
+        raise InvalidMission(f"is {text!r}; expected PROTOCOL/ADDRESS, as {DEFAULT_ENDPOINT}", where=where)
+    return text
 
 
 def position(text: str, where: str) -> Position:

@@ -26,6 +26,9 @@ from oxbow_cli.stack import StackSettings, free_endpoint, running_stack
 
 __all__ = ["Job", "Planned", "Progress", "plan_embedded", "plan_here", "plan_on"]
 
+CONNECT_S = 5.0
+"""How long a router and a mission service may take to answer; where they are up, they do in milliseconds."""
+
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
 
@@ -65,7 +68,7 @@ def plan_on(job: Job, endpoint: str) -> Planned:
         job.progress(status.stage or status.state, status.fraction)
 
     options = job.options
-    with Client(endpoint) as client:
+    with Client(endpoint, timeout_s=CONNECT_S) as client:
         planned = client.plan(
             job.mission,
             timeout_s=job.timeout_s,

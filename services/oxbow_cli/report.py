@@ -10,8 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
+from rich import box
 from rich.console import Console
 from rich.table import Table
+
+from oxbow.contracts import MissionState
 
 if TYPE_CHECKING:
     from oxbow.plan import PlanRecord
@@ -90,49 +93,40 @@ def print_evaluation(site: str, found: Evaluation) -> None:
 
 def print_status(found: StackStatus) -> None:
     """Write a stack's processes and missions to stdout."""
-    processes = Table(title=f"Processes on {found.endpoint}", title_justify="left", title_style="bold")
-    for name in (
-        "service",
-        "instance",
-        "pid",
-        "up",
-        "served",
-        "failed",
-        "busy",
-        "queued",
-        "mean",
-        "p95",
-        "memory",
-    ):
-        processes.add_column(name, justify="left" if name in ("service", "instance") else "right")
+    processes = _grid(f"Processes on {found.endpoint}", left=("service", "instance"), right=_PROCESS_FIGURES)
     for process in found.processes:
-        processes.add_row(process.service, process.instance, *_ping_cells(process), *_stats_cells(process))
+        processes.add_row(process.service, process.instance, *_process_cells(process))
     for service in found.missing:
-        processes.add_row(service, "[red]none[/red]")
-    missions = Table(title="Missions", title_justify="left", title_style="bold")
-    for name in ("mission", "revision", "state", "stage", "done", "error"):
-        missions.add_column(name, overflow="fold")
+        processes.add_row(service, "none")
+    missions = _grid("Missions", left=("mission", "state", "at work", "error"), right=("revision", "done"))
     for mission in found.missions:
         error = f"{mission.error.where}: {mission.error.message}" if mission.error else ""
-        done = f"{1.0 if mission.state.is_final else mission.fraction:.0%}"
+        done = 1.0 if mission.state is MissionState.DONE else mission.fraction
         missions.add_row(
-            mission.mission_id, str(mission.revision), mission.state.value, mission.stage, done, error
+            mission.mission_id, mission.state.value, mission.stage, error, str(mission.revision), f"{done:.0%}"
         )
     Console().print(processes, missions)
 
 
-def _ping_cells(process: Process) -> tuple[str, ...]:
-    ping = process.ping
-    return (str(ping.pid), _duration(ping.uptime_s)) if ping else ("", "")
+_PROCESS_FIGURES = ("up", "served", "failed", "queued", "mean", "p95", "memory")
 
 
-def _stats_cells(process: Process) -> tuple[str, ...]:
-    stats = process.stats
-    if stats is None:
+def _process_cells(process: Process) -> tuple[str, ...]:
+    ping, stats = process.ping, process.stats
+    if ping is None or stats is None:
         return ()
-    counts = (stats.served, stats.failed, stats.busy, stats.queued)
+    counts = map(str, (stats.served, stats.failed, stats.queued))
     memory = f"{(stats.session_rss_bytes + stats.worker_rss_bytes) / 2**20:.0f} MiB"
-    return (*map(str, counts), f"{stats.mean_s:.2f} s", f"{stats.p95_s:.2f} s", memory)
+    return (f"{ping.uptime_s:.0f} s", *counts, f"{stats.mean_s:.2f} s", f"{stats.p95_s:.2f} s", memory)
+
+
+def _grid(title: str, left: tuple[str, ...], right: tuple[str, ...]) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE, padding=(0, 1, 0, 0))
+    for name in left:
+        table.add_column(name, overflow="fold", min_width=min(len(name) + 6, 13))
+    for name in right:
+        table.add_column(name, justify="right", no_wrap=True)
+    return table
 
 
 def _table(title: str, rows: Rows) -> Table:

@@ -1,0 +1,54 @@
+"""`oxbow plan --local`: the command without processes beside it."""
+
+import json
+
+import pytest
+
+
+def test_completes_the_file_and_keeps_what_it_does_not_know(oxbow, folder):
+    result = oxbow("plan", "pond.json", "--local")
+    assert result.returncode == 0, result.stderr
+    assert "Plan of Pond" in result.stdout
+    mission = json.loads((folder / "pond.json").read_text())
+    assert mission["note"] == "kept"
+    assert mission["Master_Path"][0] == mission["Master_Path"][-1] == mission["LaunchPoint"]
+    assert mission["Plan"]["method"] == "Transect"
+
+
+def test_writes_elsewhere_when_asked(oxbow, folder):
+    before = (folder / "pond.json").read_bytes()
+    result = oxbow("plan", "pond.json", "--local", "-o", "planned.json", "--json", "--heading", 30, "--seed", 7)
+    assert result.returncode == 0, result.stderr
+    assert (folder / "pond.json").read_bytes() == before
+    printed = json.loads(result.stdout)
+    assert printed["file"] == "planned.json"
+    assert printed["Plan"] == json.loads((folder / "planned.json").read_text())["Plan"]
+    assert printed["Plan"]["heading_deg"] == pytest.approx(30.0)
+    assert printed["Plan"]["seed"] == 7
+
+
+@pytest.mark.parametrize(
+    ("fields", "options", "status", "told"),
+    [
+        ({"Safety": 500.0}, [], 3, ["Safety"]),
+        ({"MissionType": "treat"}, [], 2, ["MissionType", "treat"]),
+        ({}, ["--timeout", "0.01"], 4, ["--timeout"]),
+        ({}, ["--method", "Spiral"], 2, ["--method", "Spiral", "Transect"]),
+        ({}, ["--prior", "prior.json"], 2, ["--prior", "prior.json"]),
+        ({}, ["--connect", "tcp/127.0.0.1:7447"], 2, ["--local", "--connect"]),
+        ({}, ["--record", "pond.rrd"], 2, ["--record"]),
+        ({}, ["-o", "missing/planned.json"], 2, ["missing/planned.json"]),
+    ],
+)
+def test_on_any_failure_the_file_is_untouched(oxbow, folder, pond, fields, options, status, told):
+    file = folder / "pond.json"
+    file.write_text(json.dumps(pond(**fields)))
+    before = file.read_bytes()
+    result = oxbow("plan", "pond.json", "--local", *options)
+    assert result.returncode == status
+    assert result.stdout == ""
+    assert result.stderr.startswith("error: ")
+    assert result.stderr.count("\n") == 1
+    assert all(word in result.stderr for word in told)
+    assert file.read_bytes() == before
+    assert [path.name for path in folder.iterdir()] == ["pond.json"]
