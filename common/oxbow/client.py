@@ -30,7 +30,7 @@ from oxbow.contracts import (
     checked_id,
     mission_key,
 )
-from oxbow.errors import InvalidMission, Unavailable
+from oxbow.errors import Busy, InvalidMission, Unavailable
 from oxbow.mission import Mission, parse_mission, read_mission
 from oxbow.submission import Submission, SubmissionParameters
 
@@ -38,7 +38,7 @@ __all__ = ["Client", "Options", "PlanUpdate", "PlanUpdates"]
 
 R = TypeVar("R")
 
-ANSWER_S = 10.0
+ANSWER_S = 30.0
 """How long the mission service may take to answer what needs no planning."""
 RETRY_PAUSE_S = 0.2
 
@@ -272,19 +272,19 @@ class Client:
         return self._retry(lambda remaining_s: self._bus.query(key, timeout_s=remaining_s), ANSWER_S)
 
     def _ask(self, key: str, submission: Submission, timeout_s: float) -> bytes:
-        selector = f"{key}?{submission.parameters.text}"
+        selector = f"{key}?{submission.parameters_text}"
         document = submission.document
         return self._retry(
             lambda remaining_s: self._bus.query(selector, document, timeout_s=remaining_s)[0][1], timeout_s
         )
 
     def _retry(self, ask: Callable[[float], R], timeout_s: float) -> R:
-        """Ask anew while the service is away: whatever it is asked, it may be asked again."""
+        """Ask anew while the service is away or busy: whatever it is asked, it may be asked again."""
         give_up = time.monotonic() + timeout_s
         while True:
             try:
                 return ask(max(RETRY_PAUSE_S, give_up - time.monotonic()))
-            except Unavailable:
+            except (Busy, Unavailable):
                 if time.monotonic() + RETRY_PAUSE_S > give_up:
                     raise
             time.sleep(RETRY_PAUSE_S)

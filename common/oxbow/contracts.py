@@ -378,7 +378,7 @@ class Endpoint(Generic[Q, R]):
 
     def introspection_key(self, instance: str, what: str) -> str:
         """Where one replica tells about itself; `what` is one of `INTROSPECTION`."""
-        return f"{self.instance_key(instance)}/@{what}"
+        return introspection_key(self.stage, instance, what)
 
     def live_key(self, instance: str) -> str:
         """The liveliness token of one replica."""
@@ -406,6 +406,11 @@ def live_service(key: str) -> tuple[str, str]:
     """The service and the instance of a liveliness token's key."""
     service, instance = key.removeprefix(f"{PREFIX}/live/").split("/")
     return service, instance
+
+
+def introspection_key(service: str, instance: str, what: str) -> str:
+    """Where a process of a service tells about itself; `what` is one of `INTROSPECTION`."""
+    return f"{PREFIX}/stage/{checked_id(service)}/{checked_id(instance)}/@{what}"
 
 
 def any_introspection_key(what: str) -> str:

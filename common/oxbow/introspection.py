@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import msgspec
 
-__all__ = ["Info", "Ping", "Stats"]
+__all__ = ["Info", "Ping", "Stats", "rss_bytes"]
 
 
 class Ping(msgspec.Struct, frozen=True, kw_only=True):
@@ -45,3 +48,12 @@ class Stats(msgspec.Struct, frozen=True, kw_only=True):
     worker_restarts: int
     session_rss_bytes: int
     worker_rss_bytes: int
+
+
+def rss_bytes(pid: int) -> int:
+    """Resident memory of a process; 0 where the system does not tell."""
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    except OSError:
+        return 0
+    return pages * os.sysconf("SC_PAGE_SIZE")

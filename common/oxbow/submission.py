@@ -93,6 +93,11 @@ class Submission:
         return digest.hexdigest()
 
     @property
+    def parameters_text(self) -> str:
+        """The parameters as a query carries them, the id among them."""
+        return msgspec.structs.replace(self.parameters, id=self.mission_id).text
+
+    @property
     def mission_id(self) -> str:
         """The id asked for, or else one made of the site's name and the content."""
         if self.parameters.id is not None:

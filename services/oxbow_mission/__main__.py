@@ -17,6 +17,7 @@ from oxbow_mission.planner import Planner
 from oxbow_mission.registry import Registry
 from oxbow_mission.service import MissionService
 from oxbow_mission.store import Store
+from oxbow_mission.vitals import Vitals
 
 _log = logging.getLogger("oxbow_mission")
 
@@ -38,7 +39,7 @@ def main(argv: list[str] | None = None) -> None:
 
 
 def _serve(bus: Bus, registry: Registry, options: argparse.Namespace, lifetime: Lifetime) -> None:
-    Planner(registry, bus, options.workers)
+    Planner(registry, bus, Vitals(bus, options.instance, registry.store.waiting), options.workers)
     MissionService(bus, registry, options.instance)
     _log.info("serves missions kept in %s", options.home)
     lifetime.wait()

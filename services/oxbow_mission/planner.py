@@ -15,7 +15,7 @@ from oxbow import codec
 from oxbow.bus import Bus, BusCall
 from oxbow.bus.query import MSGPACK
 from oxbow.contracts import STAGES, Endpoint, Message, any_layer_key, layer_key
-from oxbow.errors import Internal, OxbowError
+from oxbow.errors import Internal, OxbowError, Unavailable
 from oxbow.mission import Mission, mission_json, parse_mission
 from oxbow.pipeline import plan_mission
 from oxbow.recording import Layer, LayerKind, Stamped
@@ -23,6 +23,7 @@ from oxbow.site import Site
 from oxbow.submission import SubmissionParameters
 from oxbow_mission.registry import Registry
 from oxbow_mission.store import Job, Revision
+from oxbow_mission.vitals import Vitals
 
 __all__ = ["Planner"]
 
@@ -46,13 +47,16 @@ class Planner:
         Where missions wait, and where their plans go.
     bus
         Reaches the stages.
+    vitals
+        Counts the runs.
     workers
         Missions planned at the same time.
     """
 
-    def __init__(self, registry: Registry, bus: Bus, workers: int) -> None:
+    def __init__(self, registry: Registry, bus: Bus, vitals: Vitals, workers: int) -> None:
         self.registry = registry
         self.bus = bus
+        self.vitals = vitals
         bus.patience_s = math.inf
         self._audience = bus.audience(any_layer_key(STAGE))
         # Daemons: a stage that does not answer must not keep this process from ending.
@@ -64,25 +68,21 @@ class Planner:
 
     def _work(self) -> None:
         while (job := self.registry.claim()) is not None:
-            self._plan(job)
+            started = time.monotonic()
+            outcome = self._plan(job)
+            failed = isinstance(outcome, OxbowError)
+            self.vitals.count(time.monotonic() - started, failed=failed)
+            self.registry.settle(job, outcome)
 
-    def _plan(self, job: Job) -> None:
-        """Bring a job to its end; here an unknown exception becomes an `internal` error."""
+    def _plan(self, job: Job) -> bytes | OxbowError:
+        """The plan, or why there is none; here an unknown exception becomes an `internal` error."""
         try:
-            plan = _Run(job, self.registry, self.bus, shown=bool(self._audience)).plan()
-        except _Stopped:
-            return
+            return _Run(job, self.registry, self.bus, shown=bool(self._audience)).plan()
         except OxbowError as error:
-            self.registry.fail(job, error)
-        except Exception as error:  # noqa: BLE001 - an `internal` error of the mission
+            return error
+        except Exception as error:  # noqa: BLE001 - becomes an `internal` error
             _log.exception("mission %s, revision %d", job.revision.mission_id, job.revision.number)
-            self.registry.fail(job, Internal(f"{type(error).__name__}: {error}", where=STAGE))
-        else:
-            self.registry.finish(job, plan)
-
-
-class _Stopped(Exception):  # noqa: N818 - not an error
-    """The service stops: the mission goes on another time."""
+            return Internal(f"{type(error).__name__}: {error}", where=STAGE)
 
 
 class _Run:
@@ -117,7 +117,7 @@ class _Run:
     def __call__(self, endpoint: Endpoint[Q, R], request: Q, /) -> R:
         """Call a stage, and tell that it is at work."""
         if self.registry.closed:
-            raise _Stopped
+            raise Unavailable("the service stops; the mission goes on another time", where=STAGE)
         self.registry.note_progress(self.job, endpoint.stage, ORDER.index(endpoint.stage) / len(ORDER))
         started = time.monotonic()
         try:

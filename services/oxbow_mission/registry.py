@@ -125,22 +125,18 @@ class Registry:
         self._running[job.revision] = status
         self._publish_status(status)
 
-    def finish(self, job: Job, plan: bytes) -> None:
-        """Keep and publish a plan, a completed Mission File."""
+    def settle(self, job: Job, outcome: bytes | OxbowError) -> None:
+        """Keep and publish a plan, a completed Mission File, or why there is none."""
         with self._changed:
-            if not self._closed:
-                self._settle(self.store.finish(job.revision, plan))
-
-    def fail(self, job: Job, error: OxbowError) -> None:
-        """Keep and publish why there is no plan."""
-        with self._changed:
-            if not self._closed:
-                self._settle(self.store.fail(job.revision, error))
-
-    def _settle(self, status: MissionStatus) -> None:
-        del self._running[Revision.of(status)]
-        self._announce(status)
-        self._changed.notify_all()
+            if self._closed:
+                return
+            if isinstance(outcome, OxbowError):
+                status = self.store.fail(job.revision, outcome)
+            else:
+                status = self.store.finish(job.revision, outcome)
+            del self._running[job.revision]
+            self._announce(status)
+            self._changed.notify_all()
 
     # ----------------------------------------------------------------- publishing
 

@@ -18,7 +18,7 @@ from oxbow.contracts import (
     live_key,
     mission_key,
 )
-from oxbow.errors import InvalidMission, OxbowError
+from oxbow.errors import Internal, InvalidMission, OxbowError
 from oxbow.mission import require_plannable
 from oxbow.site import Site
 from oxbow.submission import Submission
@@ -73,6 +73,11 @@ class MissionService:
         except OxbowError as error:
             _log.warning("mission %s: refused: %s", mission_id, error)
             self.registry.refuse(mission_id, document, error)
+        except Exception as error:  # noqa: BLE001 - becomes an `internal` error
+            _log.exception("mission %s: refused", mission_id)
+            self.registry.refuse(
+                mission_id, document, Internal(f"{type(error).__name__}: {error}", where="mission")
+            )
 
     def _on_report(self, key: str, payload: bytes) -> None:
         try:

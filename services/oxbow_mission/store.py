@@ -306,6 +306,12 @@ class Store:
             ).fetchone()
         return _status(row)
 
+    def waiting(self) -> int:
+        """How many revisions wait to be planned."""
+        with self._mutex:
+            row = self._db.execute("SELECT count(*) FROM revision WHERE state = 'accepted' AND NOT announced")
+            return int(row.fetchone()[0])
+
     def planned(self, mission_id: str | None = None) -> list[Revision]:
         """The revisions that have a plan, by mission and number; those of one mission where given."""
         with self._mutex:

@@ -6,6 +6,7 @@ import contextlib
 import sqlite3
 import threading
 from pathlib import Path
+from typing import TypeVar
 
 import msgspec
 import pytest
@@ -15,11 +16,13 @@ from oxbow import Client, codec
 from oxbow.bus import Bus
 from oxbow.contracts import PLAN_KEY, MissionState, MissionStatus, mission_key
 from oxbow.errors import DeadlineExceeded, ErrorCode, Infeasible, Internal, InvalidMission
+from oxbow.introspection import Info, Ping, Stats
 from oxbow.mission import parse_mission
 from oxbow.recording import LayerKind, Stamped
 
 pytestmark = pytest.mark.processes
 
+T = TypeVar("T", Ping, Info, Stats)
 WAIT_S = 20.0
 
 
@@ -240,3 +243,21 @@ def test_a_run_shows_its_site_and_its_outcome(client: Client, bus: Bus, seed: in
     assert {stamped.mission_id for stamped in shown} == {mission_id}
     assert len({stamped.request_id for stamped in shown}) == 1
     assert shown[0].origin == pytest.approx((45.0, 5.0), abs=0.01)
+
+
+# --------------------------------------------------------------------------- introspection
+
+
+def test_the_service_tells_about_itself(client: Client, bus: Bus) -> None:
+    client.plan(mission_file(), mission_id="counted")
+
+    def ask(what: str, kind: type[T]) -> T:
+        [(_, payload)] = bus.query(f"oxbow/v1/stage/mission/*/@{what}", timeout_s=WAIT_S)
+        return msgspec.json.decode(payload, type=kind)
+
+    ping, info, stats = ask("ping", Ping), ask("info", Info), ask("stats", Stats)
+    assert bus.instances("mission") == (ping.instance,) == (info.instance,) == (stats.instance,)
+    assert info.worker_pid == ping.pid
+    assert stats.served >= 1
+    assert 0.0 < stats.mean_s < WAIT_S
+    assert stats.session_rss_bytes > 2**20

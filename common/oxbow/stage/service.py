@@ -8,7 +8,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from pathlib import Path
+from contextlib import suppress
 from statistics import fmean, quantiles
 
 import msgspec
@@ -18,7 +18,7 @@ from oxbow.bus.query import MSGPACK, Query
 from oxbow.bus.session import Session
 from oxbow.envelope import Envelope
 from oxbow.errors import Busy, DeadlineExceeded, ErrorReply, InvalidMission, OxbowError, Unavailable
-from oxbow.introspection import Info, Ping, Stats
+from oxbow.introspection import Info, Ping, Stats, rss_bytes
 from oxbow.stage.answered import Answered
 from oxbow.stage.wire import Described, Done, Failed, Job, Shown
 from oxbow.stage.worker import Worker, WorkerLost
@@ -77,11 +77,10 @@ class Stage:
         _log.info("%s serves %s", self.described.instance_key, worker.handler)
 
     def drain(self) -> None:
-        """Be chosen no more, answer what has been accepted, and end the worker process."""
+        """Be chosen no more, and answer what has been accepted."""
         self.session.undeclare_live(self.described.live_key)
         self._requests.close()
         self._queryable.undeclare()
-        self.worker.close()
 
     def _accept(self, query: Query) -> None:
         """Queue a request; on the network thread, so nothing here may take its time."""
@@ -115,7 +114,8 @@ class Stage:
             exchange = _Exchange(envelope, query)
             if not self._requests.offer(exchange):
                 self._busy += 1
-                raise Busy(f"{len(self._requests)} requests are waiting", where=self.described.instance_key)
+                waiting = len(self._requests)
+                raise Busy(f"takes no more requests now; {waiting} wait", where=self.described.instance_key)
             self._open[envelope.request_id] = exchange
             return None
 
@@ -135,24 +135,27 @@ class Stage:
             self._seconds.append(time.monotonic() - started)
         for query in exchange.queries:
             self._reply(query, answer)
+        with suppress(Unavailable):
+            self._require_worker()
 
     def _answer(self, exchange: _Exchange) -> Done | Failed:
         """Have the worker answer; what is raised here says nothing of the request, which may be asked again."""
-        envelope, stage = exchange.envelope, self.described.stage
+        envelope = exchange.envelope
         if envelope.remaining_s() <= 0:
-            raise DeadlineExceeded("not started: the deadline passed in the queue", where=stage)
-        if not self.worker.alive():
-            self._restart()
+            raise DeadlineExceeded("not started: the deadline passed in the queue", where=self.described.stage)
+        self._require_worker()
         show = bool(envelope.mission_id and self._audience)
         job = Job(envelope=envelope, payload=exchange.queries[0].payload, show=show)
         try:
             return self.worker.run(job, self._publish)
         except (WorkerLost, DeadlineExceeded) as error:
             _log.error("request %s: %s", envelope.request_id, error)
-            self._restart()
             raise
 
-    def _restart(self) -> None:
+    def _require_worker(self) -> None:
+        """Replace a worker process that has ended; where that fails, this replica ends."""
+        if self.worker.alive():
+            return
         try:
             self.worker.restart()
         except Unavailable:
@@ -169,7 +172,7 @@ class Stage:
             if isinstance(answer, Done):
                 query.reply(self.described.instance_key, answer.payload, encoding=MSGPACK)
             else:
-                query.fail(answer.error.error())
+                query.fail(answer.error)
 
     def _introspect(self, key: str, _parameters: dict[str, str], _payload: bytes) -> Iterator[tuple[str, bytes]]:
         answers = {"ping": self._ping, "info": self._info, "stats": self._stats, "schema": self._schema}
@@ -208,15 +211,6 @@ class Stage:
             mean_s=fmean(seconds) if seconds else 0.0,
             p95_s=quantiles(seconds, n=20, method="inclusive")[-1] if len(seconds) > 1 else sum(seconds),
             worker_restarts=self.worker.restarts,
-            session_rss_bytes=_rss_bytes(os.getpid()),
-            worker_rss_bytes=_rss_bytes(self.worker.pid),
+            session_rss_bytes=rss_bytes(os.getpid()),
+            worker_rss_bytes=rss_bytes(self.worker.pid),
         )
-
-
-def _rss_bytes(pid: int) -> int:
-    """Resident memory of a process; 0 where the system does not tell."""
-    try:
-        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-    except OSError:
-        return 0
-    return pages * os.sysconf("SC_PAGE_SIZE")
