@@ -154,7 +154,7 @@ def test_a_request_that_kills_its_worker_ends_in_an_error(
     start_replicas()
     with pytest.raises(Internal, match=r"ended by SIGKILL; given up after .* \(tried r0: worker lost\)"):
         call(ECHO, EchoRequest(shape=SQUARE, deed=Deed.DIE))
-    assert stats(bus).worker_restarts == 3
+    wait_until(lambda: stats(bus).worker_restarts == 3)
     assert call(ECHO, EchoRequest(text="unharmed", shape=SQUARE)).text == "unharmed"
 
 

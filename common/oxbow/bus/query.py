@@ -9,7 +9,7 @@ from urllib.parse import unquote
 import msgspec
 import zenoh
 
-from oxbow.errors import ErrorReply, OxbowError
+from oxbow.errors import ErrorReply
 
 __all__ = ["JSON", "MSGPACK", "Query"]
 
@@ -50,9 +50,9 @@ class Query:
         """Give one reply; `key` must match the one that is asked."""
         self._query.reply(key, payload, encoding=encoding)
 
-    def fail(self, error: OxbowError) -> None:
+    def fail(self, error: ErrorReply) -> None:
         """Reply an error; its JSON encoding tells it from zenoh's own."""
-        self._query.reply_err(msgspec.json.encode(ErrorReply.of(error)), encoding=JSON)
+        self._query.reply_err(msgspec.json.encode(error), encoding=JSON)
 
     def __enter__(self) -> Self:
         return self

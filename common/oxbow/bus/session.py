@@ -194,17 +194,19 @@ class Session:
                     for key, reply in on_query(query.key, query.parameters, query.payload):
                         query.reply(key, reply)
                 except OxbowError as error:
-                    query.fail(error)
+                    query.fail(ErrorReply.of(error))
                 except Exception as error:  # noqa: BLE001 - becomes an `internal` reply
                     _log.exception("%s: no answer", query.key)
-                    query.fail(Internal(f"{type(error).__name__}: {error}", where=keys[0]))
+                    fault = Internal(f"{type(error).__name__}: {error}", where=keys[0])
+                    query.fail(ErrorReply.of(fault))
 
         mailbox = Mailbox[Query](f"answer {keys[0]}", deliver, size=queue_size, workers=workers)
 
         def accept(query: Query) -> None:
             if not mailbox.offer(query):
+                busy = Busy(f"{queue_size} queries are waiting; try again later", where=keys[0])
                 with query:
-                    query.fail(Busy(f"{queue_size} queries are waiting; try again later", where=keys[0]))
+                    query.fail(ErrorReply.of(busy))
 
         return self._keep(Subscription([self.declare_queryable(key, accept) for key in keys], mailbox))
 

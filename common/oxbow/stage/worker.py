@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import os
 import signal
 import subprocess
@@ -20,7 +19,6 @@ __all__ = ["Worker", "WorkerLost"]
 
 START_S = 30.0
 END_S = 2.0
-_log = logging.getLogger(__name__)
 
 
 class WorkerLost(Unavailable):
@@ -74,9 +72,9 @@ class Worker:
         Raises
         ------
         WorkerLost
-            The process died; `restart` it.
+            The process died.
         DeadlineExceeded
-            The deadline passed, and the process is stopped since nobody waits for it; `restart` it.
+            The deadline passed; the process is stopped, since nobody waits for what it does.
         """
         try:
             self._pipe.send_bytes(msgspec.msgpack.encode(job))
