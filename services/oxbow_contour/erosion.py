@@ -1,90 +1,79 @@
-"""Erosion of simplified water by the safety distance, and the check against the true shore."""
+"""Erosion of polygons by a distance, conservative and at a cost that grows with their vertices alone."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import shapely
-from shapely import Polygon, STRtree
+from shapely import MultiPolygon, Polygon
 
-from oxbow_contour.simplification import Simplified
+from oxbow.contracts import FloatArray
+from oxbow_contour.rings import GeometryArray, rings_of
 
-__all__ = ["TRUE_SHORE_RUN", "erode", "keeps_distance", "largest_safety_m"]
+__all__ = ["erode"]
 
-# Mitred corners keep the full distance, which the chords of GEOS's round ones do not, with half as many
-# vertices; beyond 5 % more than the distance they are cut off, square to the corner.
-MITRED: dict[str, Any] = {"join_style": "mitre", "mitre_limit": 1.05}
-CLOSED_CORNER = (
-    1e-6  # relative; GEOS joins offsets nearer than 1e-3 of the distance without a mitre (half its square)
-)
-ROUNDING = 1e-9  # relative, of coordinates
-TRUE_SHORE_RUN = 32  # edges of the true shore that are looked at together
+LEAST_TURN_RAD = math.radians(3)
+"""The finest that round corners are cut, however small the excess: 1 / cos(1.5°) is 1.0003."""
+OVERLAP = 0.01
+"""How far a band reaches back and ashore, of its width: where it met an edge it overlaps, and no crack stays."""
 
 
-def erode(simplified: Simplified, safety_m: float) -> list[Polygon]:
-    """Connected parts of the water farther than `safety_m` from the true contours, largest first.
+def erode(water: Sequence[Polygon | MultiPolygon], distance_m: float, excess_m: float) -> list[Polygon]:
+    """Connected parts of the water at least `distance_m` away from its contours, largest first.
 
-    The result is conservative. Take a point p of the simplified water at a distance of at least safety + t
-    from all of its contours, t being the tolerance. A strip with its rounded ends is convex and holds both its
-    run of the true contour and its edge, so that the one deforms into the other within it; p, farther than t
-    from the edge, is not swept over. No contour's winding number about p changes, therefore, and p is in the true
-    water as it is in the simplified. Each point of the true contours is within t of a simplified one, hence
-    at least `safety_m` away from p.
+    The water minus the union of its shore bands: on the water's side of each edge a rectangle of that width, and
+    where the shore bends away at its end, a polygon about the circle of that radius. On paper that is a negative
+    buffer. GEOS's, however, has round corners of chords, which are nearer to the shore than asked, and on
+    a ragged shore with edges much shorter than the distance its time and memory grow without bound.
 
     Parameters
     ----------
-    simplified
-        Contours, and the bound on how far they are from the true ones.
-    safety_m
-        Least distance to keep from the true contours; 0 still keeps off them by the rounding of coordinates.
+    water
+        Valid polygons with disjoint interiors, in metres.
+    distance_m
+        Least distance to keep, positive.
+    excess_m
+        How much farther than that from a corner of the shore the result may keep: less of it, more vertices.
     """
-    parts = np.array(simplified.parts, dtype=object)
-    distance = (safety_m + simplified.tolerance_m) * (1 + CLOSED_CORNER) + _rounding(parts)
-    eroded = shapely.get_parts(shapely.buffer(parts, -distance, **MITRED))
-    polygons = [part for part in eroded if part.area > 0]
-    return sorted(polygons, key=lambda part: (-part.area, part.bounds))
+    turn_rad = max(2 * math.acos(distance_m / (distance_m + excess_m)), LEAST_TURN_RAD)
+    oriented = shapely.orient_polygons(np.array(water, dtype=object))
+    bands = [_bands(ring, distance_m, turn_rad) for ring in rings_of(oriented)]
+    shore = shapely.union_all(np.concatenate(bands))
+    parts = [part for part in shapely.get_parts(shapely.difference(oriented, shore)) if part.area > 0]
+    return sorted(parts, key=lambda part: (-part.area, part.bounds))
 
 
-def keeps_distance(free: Polygon, water: Sequence[Polygon], safety_m: float) -> bool:
-    """Whether `free` is inside the water, nowhere nearer than `safety_m` to its contours.
+def _bands(ring: FloatArray, distance_m: float, turn_rad: float) -> GeometryArray:
+    """One polygon an edge: what lies to the left of it, and about its end where the ring turns right.
 
-    It looks at the true contours, and at nothing that the simplification or the erosion found.
+    `ring` is an array of shape (n, 2), closed, with the water on its left.
     """
-    rings = [ring for part in water for ring in (part.exterior, *part.interiors)]
-    inside = shapely.contains(np.array(water, dtype=object), free.representative_point()).any()
-    holds_a_contour = shapely.contains_xy(free, [ring.coords[0] for ring in rings]).any()
-    if not inside or holds_a_contour:
-        return False
-    edges = STRtree([edge for ring in (free.exterior, *free.interiors) for edge in _runs(ring, 1)])
-    shore = np.concatenate([_runs(ring, TRUE_SHORE_RUN) for ring in rings])
-    near, _ = edges.query(shore, predicate="dwithin", distance=safety_m * (1 - ROUNDING))
-    return not len(near)
+    start, end = ring[:-1], ring[1:]
+    along = end - start
+    normal_rad = np.arctan2(along[:, 0], -along[:, 1])
+    turn = np.remainder(normal_rad - np.roll(normal_rad, -1), 2 * math.pi)
+    turns_right = turn < math.pi
+    turn[~turns_right] = 0  # where it turns left, the next edge's rectangle covers the corner
+    tips = np.maximum(np.ceil(turn / turn_rad), 1).astype(np.intp)
+    left = distance_m * np.column_stack([np.cos(normal_rad), np.sin(normal_rad)])
+    last = np.where(turns_right[:, None], np.roll(left, -1, axis=0), left)
 
+    edge = np.repeat(np.arange(len(start)), tips)
+    step = np.arange(len(edge)) - np.repeat(np.cumsum(tips) - tips, tips)
+    share = (turn / tips)[edge]
+    tip_rad = normal_rad[edge] - (step + 0.5) * share
+    reach = distance_m / np.cos(share / 2)
+    tip = end[edge] + reach[:, None] * np.column_stack([np.cos(tip_rad), np.sin(tip_rad)])
 
-def largest_safety_m(water: Sequence[Polygon]) -> float:
-    """A safety distance that leaves some water, nearly the largest, rounded down to three digits."""
-    radius = max(shapely.length(shapely.maximum_inscribed_circle(np.array(water, dtype=object))), default=0.0)
-    if radius <= 0:
-        return 0.0
-    digit = 10.0 ** (math.floor(math.log10(radius)) - 2)
-    return math.floor(0.99 * radius / digit) * digit
-
-
-def _rounding(parts: np.ndarray[Any, np.dtype[np.object_]]) -> float:
-    return ROUNDING * float(np.abs(shapely.total_bounds(parts)).max())
-
-
-def _runs(ring: shapely.LinearRing, count: int) -> np.ndarray[Any, np.dtype[np.object_]]:
-    """A ring cut into line strings of `count` edges."""
-    points = shapely.get_coordinates(ring)
-    run = np.arange(len(points) - 1) // count
-    first = np.flatnonzero(np.diff(run, prepend=-1))
-    last = np.append(first[1:], len(points) - 1)
-    repeated = np.concatenate([np.arange(a, b + 1) for a, b in zip(first, last, strict=True)])
-    lines: np.ndarray[Any, np.dtype[np.object_]] = shapely.linestrings(
-        points[repeated], indices=np.repeat(np.arange(len(first)), last - first + 1)
-    )
-    return lines
+    every = np.arange(len(start))
+    ashore = OVERLAP * left
+    before = start - OVERLAP * np.column_stack([left[:, 1], -left[:, 0]])
+    corners = np.concatenate([before - ashore, before + left, tip, end + last, end, end - ashore])
+    owner = np.concatenate([every, every, edge, every, every, every])
+    order = np.argsort(owner, kind="stable")
+    bands = np.asarray(shapely.polygons(shapely.linearrings(corners[order], indices=owner[order])))
+    is_valid = shapely.is_valid(bands)
+    bands[~is_valid] = shapely.make_valid(bands[~is_valid])
+    return bands

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,16 +10,25 @@ import shapely
 from shapely import Polygon
 
 from oxbow.errors import Infeasible, Internal
-from oxbow_contour.erosion import erode, keeps_distance, largest_safety_m
+from oxbow_contour.erosion import erode
 from oxbow_contour.simplification import Simplified, simplify
+from oxbow_contour.verification import inscribed_radius_m, is_safe, rounded_down
 
 __all__ = ["Eroded", "default_tolerance_m", "erode_water", "true_water"]
 
-EXACT_POINTS = 20_000
-"""Contours of at most so many points may be eroded without being simplified: it takes some tenths of a second."""
-
 REACH = 0.25
-"""How far (in spacings) eroded true water may be from the free space kept; farther, the tolerance is too coarse."""
+"""How far, in spacings, water that erosion may leave can be from the free space; farther, it is an arm lost."""
+
+MANY_POINTS = 50_000
+"""Simplified contours of more points than this are made coarser, and are not refined for the sake of an arm:
+it would take many seconds.
+"""
+
+COARSEST, FINEST = 1 / 20, 1 / 2000
+"""Bounds, in spacings, on tolerances that are made coarser or finer; what would be finer still is exact."""
+
+ROUNDING = 1e-9
+"""Of coordinates, relative."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +48,7 @@ def true_water(outline: Polygon, zones: Sequence[Polygon]) -> tuple[Polygon, ...
     Infeasible
         The zones cover the whole outline.
     """
-    water = outline.difference(shapely.union_all(list(zones)))
+    water = outline.difference(shapely.union_all(list(zones))) if zones else outline
     parts = tuple(part for part in shapely.get_parts(water) if isinstance(part, Polygon) and part.area > 0)
     if not parts:
         raise Infeasible("cover the whole outline and leave no water", where="ForbiddenZones")
@@ -55,51 +64,100 @@ def default_tolerance_m(safety_m: float, spacing_m: float) -> float:
     return float(np.clip(safety_m / 20, spacing_m / 200, spacing_m / 100))
 
 
-def erode_water(water: Sequence[Polygon], safety_m: float, spacing_m: float, tolerance_m: float) -> Eroded:
-    """Free space of the true water, at the coarsest tolerance up to `tolerance_m` that keeps its arms connected.
+def erode_water(
+    water: Sequence[Polygon], safety_m: float, spacing_m: float, tolerance_m: float | None = None
+) -> Eroded:
+    """Free space of the true water, from contours refined until their simplification closes no arm of it.
+
+    Parameters
+    ----------
+    water
+        Parts of the true water, in metres.
+    safety_m, spacing_m
+        Distance to keep from the contours, and between transects.
+    tolerance_m
+        Half width of the first strips; by default `default_tolerance_m`, or coarser for very long contours.
 
     Raises
     ------
     Infeasible
         Nothing is left at this safety distance.
     Internal
-        The result is not safe, even with true contours.
+        The result is not safe, not even from the true contours.
     """
-    reference = _exact_largest(water, safety_m)
-    warnings: list[str] = []
-    for tolerance in _tolerances(tolerance_m, spacing_m):
-        simplified = simplify(water, tolerance)
-        parts = erode(simplified, safety_m)
-        if not parts or (tolerance > 0 and _loses_arms(parts[0], reference, REACH * spacing_m)):
-            continue
-        if keeps_distance(parts[0], water, safety_m):
-            if tolerance < tolerance_m:
-                warnings.append(
-                    f"tolerance reduced from {tolerance_m:g} to {tolerance:g} m to keep narrow arms open"
-                )
-            return Eroded(parts=tuple(parts), simplified=simplified, warnings=tuple(warnings))
-    if parts:
-        raise Internal(f"free space nearer than {safety_m:g} m to the shore", where="contour")
-    largest = largest_safety_m(water)
-    raise Infeasible(f"safety_m = {safety_m:g} leaves no water; at most {largest:g} m would", where="Safety")
+    asked_m = default_tolerance_m(safety_m, spacing_m) if tolerance_m is None else tolerance_m
+    simplified = simplify(water, asked_m)
+    while tolerance_m is None and _is_long(simplified, spacing_m):
+        simplified = simplify(water, 2 * simplified.tolerance_m)
+    while True:
+        parts = _shrunk(simplified, safety_m)
+        if not parts:
+            _require_room(water, safety_m, is_certain=simplified.tolerance_m == 0)
+        elif is_safe(parts[0], water, safety_m) and not _closes_arms(simplified, parts[0], safety_m, spacing_m):
+            return Eroded(parts=tuple(parts), simplified=simplified, warnings=_warnings(simplified, asked_m))
+        elif simplified.tolerance_m == 0:
+            raise Internal(f"free space is nearer than {safety_m:g} m to the shore", where="contour")
+        simplified = simplify(water, _finer_m(simplified.tolerance_m, spacing_m))
 
 
-def _tolerances(tolerance_m: float, spacing_m: float) -> Iterator[float]:
-    while tolerance_m > spacing_m / 2000:
-        yield tolerance_m
-        tolerance_m /= 4
-    yield 0.0
+def _is_long(simplified: Simplified, spacing_m: float) -> bool:
+    return simplified.points_out > MANY_POINTS and simplified.tolerance_m < COARSEST * spacing_m
 
 
-def _exact_largest(water: Sequence[Polygon], safety_m: float) -> Polygon | None:
-    if shapely.get_num_coordinates(list(water)).sum() > EXACT_POINTS:
-        return None
-    parts = shapely.get_parts(shapely.buffer(list(water), -safety_m, quad_segs=16))
-    return max(parts, key=lambda part: part.area, default=None)
+def _finer_m(tolerance_m: float, spacing_m: float) -> float:
+    return tolerance_m / 4 if tolerance_m > FINEST * spacing_m else 0.0
 
 
-def _loses_arms(free: Polygon, reference: Polygon | None, reach_m: float) -> bool:
-    if reference is None or reference.is_empty:
+def _shrunk(simplified: Simplified, safety_m: float) -> list[Polygon]:
+    """Connected parts of the water farther than `safety_m` from the true contours, largest first.
+
+    The result is conservative. Take a point p of the simplified water at a distance of at least safety + t
+    from all of its contours, t being the tolerance. A strip with its rounded ends is convex and holds both its
+    run of the true contour and its edge, so that the one deforms into the other within it; p, farther than t
+    from the edge, is not swept over. No contour's winding number about p changes, therefore, and p is in the true
+    water as it is in the simplified. Each point of the true contours is within t of a simplified one, hence
+    at least `safety_m` away from p. The new contours, in turn, are simplified within a slack eroded before.
+    """
+    tolerance_m = simplified.tolerance_m
+    slack_m = tolerance_m / 10 + ROUNDING * simplified.extent_m
+    parts = erode(simplified.parts, safety_m + tolerance_m + 2 * slack_m, excess_m=tolerance_m)
+    return [part for part in shapely.simplify(parts, slack_m) if part.area > 0]
+
+
+def _closes_arms(simplified: Simplified, free: Polygon, safety_m: float, spacing_m: float) -> bool:
+    """Whether the tolerance may have cost more than a strip along the shore.
+
+    What erosion leaves of the true water lies between what it leaves of the simplified at safety + t, which is
+    `free`, and at safety - t. Where all of the latter's largest part is near the former, so is what lies between.
+    """
+    if simplified.tolerance_m == 0 or simplified.points_out > MANY_POINTS:
         return False
+    least_m = safety_m - 2 * simplified.tolerance_m
+    outer = erode(simplified.parts, least_m, simplified.tolerance_m) if least_m > 0 else simplified.parts
+    largest = max(outer, key=shapely.area)
     shapely.prepare(free)
-    return not shapely.dwithin(free, shapely.points(shapely.get_coordinates(reference)), reach_m).all()
+    return not shapely.dwithin(free, shapely.points(shapely.get_coordinates(largest)), REACH * spacing_m).all()
+
+
+def _require_room(water: Sequence[Polygon], safety_m: float, *, is_certain: bool) -> None:
+    """Raise `Infeasible` where no circle of that radius fits into the water, or it is certain already."""
+    precision_m = safety_m / 1000
+    radius_m = inscribed_radius_m(water, precision_m)
+    if is_certain or radius_m + precision_m < safety_m:
+        at_most_m = rounded_down(0.99 * min(radius_m, safety_m))
+        raise Infeasible(
+            f"safety_m = {safety_m:g} leaves no water; expected at most {at_most_m:g} m, which leaves some",
+            where="Safety",
+        )
+
+
+def _warnings(simplified: Simplified, asked_m: float) -> tuple[str, ...]:
+    tolerance_m, points = simplified.tolerance_m, simplified.points_out
+    warnings = []
+    if tolerance_m < asked_m:
+        warnings.append(f"contours are simplified to {tolerance_m:g} m: {asked_m:g} m might have closed an arm")
+    if tolerance_m > asked_m:
+        warnings.append(f"contours are simplified to {tolerance_m:g} m: at {asked_m:g} m they had many points")
+    if tolerance_m > 0 and points > MANY_POINTS:
+        warnings.append(f"contours of {points} points: it was not checked whether simplification closes an arm")
+    return tuple(warnings)

@@ -11,6 +11,7 @@ import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 
 from oxbow.contracts import FloatArray
+from oxbow_contour.rings import rings_of
 from oxbow_contour.strips import IndexArray, deviations, strip_ends
 
 __all__ = ["Simplified", "simplify"]
@@ -35,6 +36,11 @@ class Simplified:
         """Points of the true contours for each point of the simplified ones."""
         return self.points_in / self.points_out
 
+    @property
+    def extent_m(self) -> float:
+        """The largest coordinate, to which rounding is relative."""
+        return float(np.abs(shapely.total_bounds(self.parts)).max())
+
 
 def simplify(water: Sequence[Polygon], tolerance_m: float) -> Simplified:
     """Simplify the contours of polygons, all together.
@@ -50,7 +56,7 @@ def simplify(water: Sequence[Polygon], tolerance_m: float) -> Simplified:
     tolerance_m
         Half width of the strips: no point of a contour is farther than this from the edge that stands for it.
     """
-    rings = [shapely.get_coordinates(ring) for part in water for ring in (part.exterior, *part.interiors)]
+    rings = rings_of(shapely.remove_repeated_points(np.array(water, dtype=object)))
     sizes = np.array([len(ring) for ring in rings])
     starts = np.cumsum(sizes) - sizes
     points = np.concatenate(rings)

@@ -1,0 +1,32 @@
+"""Polygons taken apart into rings, and rings into runs of edges."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely import Polygon
+
+from oxbow.contracts import FloatArray
+
+__all__ = ["GeometryArray", "rings_of", "runs_of"]
+
+GeometryArray = np.ndarray[Any, np.dtype[np.object_]]
+
+
+def rings_of(polygons: Polygon | Sequence[Polygon] | GeometryArray) -> list[FloatArray]:
+    """Closed arrays of shape (n, 2): of each polygon the exterior ring, then the interior ones."""
+    rings = shapely.get_rings(shapely.get_parts(np.asarray(polygons)))
+    return np.split(shapely.get_coordinates(rings), np.cumsum(shapely.get_num_coordinates(rings))[:-1])
+
+
+def runs_of(ring: FloatArray, edges: int) -> GeometryArray:
+    """A closed ring as line strings of so many edges, the last one of what is left."""
+    first = np.arange(0, len(ring) - 1, edges)
+    sizes = np.minimum(first + edges, len(ring) - 1) - first + 1
+    offset = np.cumsum(sizes) - sizes
+    point = np.arange(sizes.sum()) - np.repeat(offset - first, sizes)
+    runs: GeometryArray = shapely.linestrings(ring[point], indices=np.repeat(np.arange(len(first)), sizes))
+    return runs

@@ -1,0 +1,57 @@
+"""The check of free space against the true shore, and how much safety the true water has room for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely import Polygon, STRtree
+
+from oxbow_contour.rings import rings_of, runs_of
+
+__all__ = ["inscribed_radius_m", "is_safe", "rounded_down"]
+
+SHORE_RUN = 32
+"""Edges of the true shore that are looked at together."""
+
+ROUNDING = 1e-9
+"""Of distances, relative."""
+
+
+def is_safe(free: Polygon, water: Sequence[Polygon], safety_m: float) -> bool:
+    """Whether `free` is inside the water, and nowhere nearer than `safety_m` to its contours.
+
+    It relies on nothing that the simplification or the erosion found.
+
+    Parameters
+    ----------
+    free
+        What is claimed to be safe, in metres.
+    water
+        The true water, its parts with disjoint interiors.
+    safety_m
+        The distance to keep; at 0, `free` may not even touch the contours.
+    """
+    if not shapely.contains(np.array(water, dtype=object), free.representative_point()).any():
+        return False
+    shore = rings_of(water)
+    if shapely.contains_xy(free, [ring[0] for ring in shore]).any():
+        return False
+    edges = STRtree(np.concatenate([runs_of(ring, 1) for ring in rings_of(free)]))
+    runs = np.concatenate([runs_of(ring, SHORE_RUN) for ring in shore])
+    near, _ = edges.query(runs, predicate="dwithin", distance=safety_m * (1 - ROUNDING))
+    return not len(near)
+
+
+def inscribed_radius_m(water: Sequence[Polygon], precision_m: float) -> float:
+    """The radius of the largest circle in the water, at most `precision_m` too small."""
+    circles = shapely.maximum_inscribed_circle(np.array(water, dtype=object), precision_m)
+    return float(shapely.length(circles).max())
+
+
+def rounded_down(value: float, digits: int = 3) -> float:
+    """A positive number, rounded down to so many significant digits."""
+    unit = 10.0 ** (math.floor(math.log10(value)) + 1 - digits)
+    return float(f"{math.floor(value / unit) * unit:.{digits}g}")
