@@ -6,11 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
-from shapely import LineString, Point, STRtree
+from shapely import LineString, MultiLineString, Point, STRtree
+from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import Place
 from oxbow_certificate.distance import segments_of
-from oxbow_certificate.region import QUAD_SEGS, JudgedSpace
+from oxbow_certificate.erosion import eroded
+from oxbow_certificate.region import JudgedSpace
 
 __all__ = ["count_crossings", "outside_length", "unsafe_length"]
 
@@ -46,7 +48,8 @@ def count_crossings(path: LineString) -> int:
 
 def outside_length(path: LineString, space: JudgedSpace) -> float:
     """Metres of `path` outside the outline or inside a forbidden zone."""
-    return float(shapely.difference(path, shapely.buffer(space.water, SHORE_TOLERANCE_M)).length)
+    outside = _beyond(path, space.water)
+    return float(_beyond(outside, space.water.buffer(SHORE_TOLERANCE_M)).length) if outside.length else 0.0
 
 
 def unsafe_length(path: LineString, space: JudgedSpace, safety_m: float, ends: Sequence[Place]) -> float:
@@ -57,8 +60,18 @@ def unsafe_length(path: LineString, space: JudgedSpace, safety_m: float, ends: S
     """
     if safety_m == 0:
         return 0.0
-    safe = shapely.buffer(space.water, -SAFETY_SHARE * safety_m, quad_segs=QUAD_SEGS)
     excused = [
         place.buffer(2.0 * safety_m + 1.5 * place.distance(space.free)) for place in (Point(end) for end in ends)
     ]
-    return float(shapely.difference(path, shapely.union_all([safe, *excused])).length)
+    unexcused = _beyond(path, shapely.union_all([space.free, *excused]))
+    if unexcused.length == 0:
+        return 0.0
+    return float(_beyond(unexcused, eroded(space.water, SAFETY_SHARE * safety_m, space.detail_m)).length)
+
+
+def _beyond(lines: BaseGeometry, region: BaseGeometry) -> BaseGeometry:
+    """The parts of `lines` outside `region`; only segments that leave it are overlaid."""
+    shapely.prepare(region)
+    segments = np.concatenate([segments_of(line) for line in shapely.get_parts(lines)])
+    leaving = segments[~shapely.covers(region, segments)]
+    return shapely.difference(MultiLineString(list(leaving)), region)

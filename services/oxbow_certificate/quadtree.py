@@ -30,16 +30,6 @@ class Squares:
         west, south, east, north = region.bounds
         return cls(np.array([[(west + east) / 2, (south + north) / 2]]), max(east - west, north - south) / 2)
 
-    @classmethod
-    def tiling(cls, region: BaseGeometry, side_m: float) -> Squares:
-        """The squares with sides of `side_m` that meet `region`."""
-        root = cls.around(region)
-        levels = math.ceil(math.log2(max(2 * root.half_m / side_m, 1.0)))
-        squares = cls(root.centres, side_m * 2**levels / 2)
-        for _ in range(levels):
-            squares = squares.quarters().meeting(region)
-        return squares
-
     def __len__(self) -> int:
         return len(self.centres)
 

@@ -1,4 +1,4 @@
-"""The water that a path is judged on: the mission's own, before any simplification by the planner."""
+"""The water that a path is judged on: the mission's own, not the planner's simplified one."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ from dataclasses import dataclass
 
 import shapely
 from shapely import MultiPolygon, Polygon
-from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import CertifyRequest
 from oxbow.errors import Infeasible
+from oxbow_certificate.cover import least_radius
+from oxbow_certificate.erosion import eroded, polygons
 
-__all__ = ["QUAD_SEGS", "JudgedSpace"]
+__all__ = ["JudgedSpace"]
 
-QUAD_SEGS = 16
-"""Segments for a quarter circle of an eroded contour: its chords come 0.12 % of the safety distance nearer."""
+DETAIL_SHARE = 1e-3
+"""How far the judged shore may lie from the true one, as a share of what is measured: see `_detail`."""
 
 
 @dataclass(frozen=True)
@@ -26,17 +27,20 @@ class JudgedSpace:
     water
         The outline less the forbidden zones.
     free
-        The water eroded by the safety distance, as its connected parts.
+        The water eroded by the safety distance: its connected parts.
     judged
         The parts of `free` that the path enters; all of them where it enters none.
     judged_area
         The share of the free area that the path enters, 0 to 1.
+    detail_m
+        Detail of the shore finer than this is not followed in `free`.
     """
 
     water: Polygon | MultiPolygon
     free: MultiPolygon
     judged: MultiPolygon
     judged_area: float
+    detail_m: float
 
     @classmethod
     def of(cls, request: CertifyRequest) -> JudgedSpace:
@@ -47,25 +51,30 @@ class JudgedSpace:
         Infeasible
             The zones or the safety distance leave no water.
         """
-        water = request.outline.difference(shapely.union_all(request.zones))
-        if not water.area > 0:
+        water = MultiPolygon(polygons(request.outline.difference(shapely.union_all(request.zones))))
+        if water.is_empty:
             raise Infeasible("cover the whole outline; expected some water between them", where="zones")
-        parts = _polygons(water.buffer(-request.safety_m, quad_segs=QUAD_SEGS) if request.safety_m else water)
+        detail_m = _detail(water, request)
+        parts = polygons(eroded(water, request.safety_m, detail_m))
         if not parts:
             raise Infeasible(
                 f"is {request.safety_m:g} m, which leaves no water; expected less than {_inradius(water):g} m",
                 where="safety_m",
             )
         free = MultiPolygon(parts)
-        entered = [part for part in parts if shapely.intersects(part, request.path)]
-        judged = MultiPolygon(entered or parts)
-        return cls(water, free, judged, sum(part.area for part in entered) / free.area)
+        entered = [part for part in parts if part.intersects(request.path)]
+        entered_area = sum(part.area for part in entered)
+        return cls(water, free, MultiPolygon(entered or parts), entered_area / free.area, detail_m)
 
 
-def _polygons(geometry: BaseGeometry) -> list[Polygon]:
-    return [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon) and part.area > 0]
+def _detail(water: MultiPolygon, request: CertifyRequest) -> float:
+    """Tolerance that moves area, distances and erosion by no more than a thousandth: a million vertices need one."""
+    scales = [water.area / water.length, least_radius(water.area, request.path.length)]
+    if request.safety_m:
+        scales.append(request.safety_m)
+    return DETAIL_SHARE * min(scales)
 
 
-def _inradius(water: BaseGeometry) -> float:
+def _inradius(water: MultiPolygon) -> float:
     """Radius of the largest disc that fits in the water, in metres."""
-    return max(shapely.maximum_inscribed_circle(part).length for part in _polygons(water))
+    return max(float(shapely.maximum_inscribed_circle(part).length) for part in water.geoms)

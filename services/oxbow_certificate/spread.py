@@ -11,9 +11,10 @@ from shapely import MultiPolygon
 
 from oxbow.contracts import FloatArray
 from oxbow_certificate.distance import PathDistance
-from oxbow_certificate.quadtree import Squares
 
-__all__ = ["DistanceSpread", "distance_spread", "stratified_places"]
+__all__ = ["DistanceSpread", "distance_spread", "even_places"]
+
+_GOLDEN_RATIO = (1 + math.sqrt(5)) / 2
 
 
 @dataclass(frozen=True)
@@ -35,19 +36,25 @@ class DistanceSpread:
 
 
 def distance_spread(region: MultiPolygon, distance: PathDistance, *, count: int = 32_000) -> DistanceSpread:
-    """Distance to a path over `region`, at `count` places or so."""
-    places = stratified_places(region, count)
+    """Distance to a path at `count` places of `region`."""
+    places = even_places(region, count)
     return DistanceSpread(places, distance(places))
 
 
-def stratified_places(region: MultiPolygon, count: int, *, seed: int = 0) -> FloatArray:
-    """Places (n, 2) spread over `region` by area, n near `count`: the same for the same arguments.
+def even_places(region: MultiPolygon, count: int) -> FloatArray:
+    """Places (count, 2) spread over `region` evenly by area: the same for the same arguments.
 
-    One place at random in each of equal squares (stratified sampling, McKay et al. 1979): a regular grid
-    would fall into step with parallel transects.
+    The region is cut into triangles, laid end to end by area, and each of `count` equal shares of the whole takes
+    one place: within a triangle they are a Fibonacci lattice. No place is rejected, however thin the region, and no
+    grid falls into step with parallel transects.
     """
-    shapely.prepare(region)
-    squares = Squares.tiling(region, math.sqrt(region.area / count))
-    jitter = np.random.default_rng(seed).uniform(-squares.half_m, squares.half_m, size=squares.centres.shape)
-    places = squares.centres + jitter
-    return np.asarray(places[shapely.contains_xy(region, places)])
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(region))
+    corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+    areas = shapely.area(triangles)
+    ends = np.cumsum(areas)
+    at = (np.arange(count) + 0.5) / count * ends[-1]
+    chosen = np.searchsorted(ends, at)
+    a, b, c = corners[chosen].transpose(1, 0, 2)
+    root = np.sqrt((ends[chosen] - at) / areas[chosen])[:, None]
+    v = (np.arange(count) / _GOLDEN_RATIO % 1.0)[:, None]
+    return np.asarray((1 - root) * a + root * ((1 - v) * b + v * c))
