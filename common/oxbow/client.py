@@ -69,7 +69,7 @@ class PlanUpdates(Iterator[PlanUpdate]):
 
     def __init__(self, bus: Bus, key: MissionKey, kept: Iterator[PlanUpdate], timeout_s: float | None) -> None:
         self.timeout_s = timeout_s
-        self._kept = kept
+        self._kept: Iterator[PlanUpdate] = kept
         self._live: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._seen: dict[str, int] = {}
         # Before what is kept is asked for, so that nothing is missed between the two.
@@ -102,6 +102,7 @@ class PlanUpdates(Iterator[PlanUpdate]):
 
     def close(self) -> None:
         """Receive nothing more, and end the iteration."""
+        self._kept = iter(())
         self._subscription.close()
         self._live.put(None)
 

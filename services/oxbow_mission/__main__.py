@@ -11,7 +11,7 @@ from pathlib import Path
 import platformdirs
 
 from oxbow.bus import DEFAULT_ENDPOINT, Bus
-from oxbow.errors import OxbowError, Unavailable
+from oxbow.errors import Internal, OxbowError, Unavailable
 from oxbow.lifetime import Lifetime
 from oxbow_mission.planner import Planner
 from oxbow_mission.registry import Registry
@@ -23,7 +23,7 @@ _log = logging.getLogger("oxbow_mission")
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Serve until told to end; exits with status 4 where another process holds the store."""
+    """Serve until told to end; exits with status 4 where the store cannot be had, 1 where it fails."""
     options = _options(argv)
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s")
     lifetime = Lifetime(options.parent)
@@ -35,14 +35,17 @@ def main(argv: list[str] | None = None) -> None:
                     _serve(bus, registry, options, lifetime)
     except OxbowError as error:
         _log.error("%s", error)
-        sys.exit(4)
+        sys.exit(4 if isinstance(error, Unavailable) else 1)
 
 
 def _serve(bus: Bus, registry: Registry, options: argparse.Namespace, lifetime: Lifetime) -> None:
-    Planner(registry, bus, Vitals(bus, options.instance, registry.store.waiting), options.workers)
+    vitals = Vitals(bus, options.instance, registry.store.waiting)
+    planner = Planner(registry, bus, vitals, options.workers, on_failure=lifetime.end)
     MissionService(bus, registry, options.instance)
     _log.info("serves missions kept in %s", options.home)
     lifetime.wait()
+    if planner.failed:
+        raise Internal("missions could not be kept; see the log", where=str(options.home))
 
 
 def _connect(endpoint: str, lifetime: Lifetime) -> Bus | None:

@@ -6,6 +6,7 @@ import logging
 import math
 import threading
 import time
+from collections.abc import Callable
 from typing import TypeVar
 
 import msgspec
@@ -51,12 +52,18 @@ class Planner:
         Counts the runs.
     workers
         Missions planned at the same time.
+    on_failure
+        Called when an outcome cannot be kept or published: this process had better start anew.
     """
 
-    def __init__(self, registry: Registry, bus: Bus, vitals: Vitals, workers: int) -> None:
+    def __init__(
+        self, registry: Registry, bus: Bus, vitals: Vitals, workers: int, on_failure: Callable[[], None]
+    ) -> None:
         self.registry = registry
         self.bus = bus
         self.vitals = vitals
+        self.on_failure = on_failure
+        self.failed = False
         bus.patience_s = math.inf
         self._audience = bus.audience(any_layer_key(STAGE))
         # Daemons: a stage that does not answer must not keep this process from ending.
@@ -67,12 +74,16 @@ class Planner:
             thread.start()
 
     def _work(self) -> None:
-        while (job := self.registry.claim()) is not None:
-            started = time.monotonic()
-            outcome = self._plan(job)
-            failed = isinstance(outcome, OxbowError)
-            self.vitals.count(time.monotonic() - started, failed=failed)
-            self.registry.settle(job, outcome)
+        try:
+            while (job := self.registry.claim()) is not None:
+                started = time.monotonic()
+                outcome = self._plan(job)
+                self.vitals.count(time.monotonic() - started, failed=isinstance(outcome, OxbowError))
+                self.registry.settle(job, outcome)
+        except Exception:  # noqa: BLE001 - a full disk, say
+            _log.exception("the planner ends")
+            self.failed = True
+            self.on_failure()
 
     def _plan(self, job: Job) -> bytes | OxbowError:
         """The plan, or why there is none; here an unknown exception becomes an `internal` error."""
@@ -145,7 +156,7 @@ class _Run:
 
 
 def _site_layer(site: Site) -> Layer:
-    zones = tuple(f"ForbiddenZones {index}" for index in range(len(site.zones)))
+    zones = ("forbidden zone",) * len(site.zones)
     return Layer(
         stage=STAGE,
         name="site",

@@ -71,10 +71,10 @@ class Registry:
         request = Request(submission.document, parameters, submission.fingerprint)
         with self._changed:
             status = self.store.accept(submission.mission_id, request)
-            if status.state is MissionState.ACCEPTED:
-                self._publish_status(status)
-                self._changed.notify_all()
-            return self._running.get(Revision.of(status), status)
+            status = self._running.get(Revision.of(status), status)
+            self._publish_status(status)
+            self._changed.notify_all()
+            return status
 
     def refuse(self, mission_id: str, document: bytes, error: OxbowError) -> None:
         """Let it be known that a request was invalid: its sender may be listening to the status alone.

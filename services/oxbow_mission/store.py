@@ -111,18 +111,24 @@ class Store:
     Raises
     ------
     Unavailable
-        Another process holds the folder, or it was written by a newer version.
+        Another process holds the folder, it was written by another version, or it cannot be written.
     """
 
     def __init__(self, home: Path) -> None:
-        home.mkdir(parents=True, exist_ok=True)
         self.path = home / "missions.sqlite3"
         self._mutex = threading.RLock()
         with contextlib.ExitStack() as stack:
-            self._lock = stack.enter_context((home / "missions.lock").open("a+"))
-            self._hold(home)
-            self._db = stack.enter_context(contextlib.closing(self._opened()))
-            self._resume()
+            try:
+                home.mkdir(parents=True, exist_ok=True)
+                self._lock = stack.enter_context((home / "missions.lock").open("a+"))
+                self._hold(home)
+                self._db = stack.enter_context(
+                    contextlib.closing(sqlite3.connect(self.path, check_same_thread=False))
+                )
+                self._set_up()
+                self._resume()
+            except (OSError, sqlite3.Error) as error:
+                raise Unavailable(f"cannot keep missions: {error}", where=str(home)) from error
             self._stack = stack.pop_all()
 
     def _hold(self, home: Path) -> None:
@@ -139,18 +145,15 @@ class Store:
         self._lock.write(f"{os.getpid()}\n")
         self._lock.flush()
 
-    def _opened(self) -> sqlite3.Connection:
-        db = sqlite3.connect(self.path, check_same_thread=False)
-        db.row_factory = sqlite3.Row
-        db.execute("PRAGMA journal_mode = WAL")
-        db.execute("PRAGMA synchronous = FULL")
-        version = db.execute("PRAGMA user_version").fetchone()[0]
+    def _set_up(self) -> None:
+        self._db.row_factory = sqlite3.Row
+        self._db.execute("PRAGMA journal_mode = WAL")
+        self._db.execute("PRAGMA synchronous = FULL")
+        version = self._db.execute("PRAGMA user_version").fetchone()[0]
         if version == 0:
-            db.executescript(_SCHEMA)
+            self._db.executescript(_SCHEMA)
         elif version != SCHEMA_VERSION:
-            db.close()
             raise Unavailable(f"has schema {version}; this version reads {SCHEMA_VERSION}", where=str(self.path))
-        return db
 
     def __enter__(self) -> Self:
         return self

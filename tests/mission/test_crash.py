@@ -13,12 +13,14 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import msgspec
+import psutil
 import pytest
 from mission_files import INFEASIBLE_SEED, listening, mission_file, revision_of
 
 from oxbow import Client
 from oxbow.bus import Bus
 from oxbow.contracts import MissionState, MissionStatus
+from oxbow.errors import Internal
 from oxbow.mission import parse_mission
 from oxbow_mission.store import Request, Store
 
@@ -49,6 +51,22 @@ def test_a_second_service_on_one_store_is_refused(router: str, start_service: Ca
     start_service()
     with Client(router, timeout_s=WAIT_S):
         assert start_service().wait(WAIT_S) == 4
+
+
+def test_a_full_disk_loses_no_mission(
+    router: str, start_service: Callable[[], Process], start_stages: Callable[[], None]
+) -> None:
+    service = start_service()
+    with Client(router, timeout_s=WAIT_S) as client:
+        client.submit(mission_file(), mission_id="full")
+        psutil.Process(service.pid).rlimit(psutil.RLIMIT_FSIZE, (1, 1))
+        with pytest.raises(Internal):
+            client.submit(mission_file(), mission_id="too-much")
+        start_stages()
+        assert service.wait(WAIT_S) == 1
+        start_service()
+        assert revision_of(client.plan(mission_file(), mission_id="full")) == 1
+        assert [status.mission_id for status in client.statuses()] == ["full"]
 
 
 def test_what_was_kept_but_not_yet_published_is_published_at_the_start(

@@ -150,6 +150,13 @@ def test_a_put_is_answered_by_status_and_plan(client: Client, bus: Bus) -> None:
     assert client.status("put").state is MissionState.DONE
 
 
+def test_a_put_of_what_is_known_is_answered_by_its_status(client: Client, bus: Bus) -> None:
+    client.plan(mission_file(), mission_id="known")
+    with listening(bus, mission_key("known", "status")) as statuses:
+        bus.publish(mission_key("known", "request"), mission_file())
+        assert status_of(statuses) == client.status("known")
+
+
 def test_a_late_joiner_has_every_plan_once_and_in_order(client: Client) -> None:
     for safety in (1, 2):
         client.plan(mission_file(Safety=safety), mission_id="late-joiner")

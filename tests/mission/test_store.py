@@ -120,6 +120,15 @@ def test_a_newer_schema_is_left_alone(store: Store, tmp_path: Path) -> None:
         Store(tmp_path)
 
 
+def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    with pytest.raises(Unavailable, match="cannot keep missions"):
+        Store(tmp_path / "file" / "home")
+    (tmp_path / "missions.sqlite3").write_bytes(b"no database" * 1000)
+    with pytest.raises(Unavailable, match="not a database"):
+        Store(tmp_path)
+
+
 def test_what_kills_the_service_time_after_time_fails(tmp_path: Path) -> None:
     with Store(tmp_path) as store:
         store.accept("lake", request("a"))
