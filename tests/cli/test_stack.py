@@ -51,7 +51,6 @@ def start(folder, environment) -> Iterator[Callable[..., subprocess.Popen[str]]]
             cwd=folder,
             env=environment,
             stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
             text=True,
         )
         started.append(process)
