@@ -11,7 +11,7 @@ from __future__ import annotations
 import queue
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -264,10 +264,12 @@ class Client:
         every = key.mission_id == ANY
         mission_ids = [status.mission_id for status in self.statuses()] if every else [key.mission_id]
         for mission_id in mission_ids:
-            with suppress(InvalidMission):
+            try:
                 replies = self._ask_kept(str(MissionKey(mission_id, key.what, ANY)))
-                updates = [_plan_update(payload) for _key, payload in replies]
-                yield from sorted(updates, key=lambda update: update.revision)
+            except InvalidMission:  # nothing is kept of it
+                continue
+            updates = [_plan_update(payload) for _key, payload in replies]
+            yield from sorted(updates, key=lambda update: update.revision)
 
     def _ask_kept(self, key: str) -> list[tuple[str, bytes]]:
         return self._retry(lambda remaining_s: self._bus.query(key, timeout_s=remaining_s), ANSWER_S)

@@ -71,7 +71,10 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
         "--instance", default=f"pid{os.getpid()}", help="the name on the bus (default: %(default)s)"
     )
     parser.add_argument("--parent", type=int, help="end when this parent process has ended")
-    return parser.parse_args(argv)
+    options = parser.parse_args(argv)
+    if options.workers < 1:
+        parser.error(f"--workers is {options.workers}; expected 1 or more")
+    return options
 
 
 def _default_home() -> Path:

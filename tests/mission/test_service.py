@@ -89,10 +89,14 @@ def test_a_fault_of_a_stage_is_told_and_tried_anew_when_asked_again(client: Clie
         assert client.status("broken").revision == revision
 
 
-def test_a_deadline_is_kept(client: Client) -> None:
-    client.submit(mission_file(), mission_id="late", deadline_s=0.3, seed=2_000)
+def test_a_deadline_is_kept(client: Client, bus: Bus) -> None:
+    with listening(bus, mission_key("late", "status")) as statuses:
+        client.submit(mission_file(), mission_id="late", deadline_s=0.3, seed=1_000)
+        error = final_status(statuses).error
+    assert error is not None
+    assert error.code is ErrorCode.TIMEOUT
     with pytest.raises(DeadlineExceeded):
-        client.plan(mission_file(), mission_id="late", seed=2_000)
+        client.plan(mission_file(), mission_id="late", seed=1_000, timeout_s=0.3)
 
 
 @pytest.mark.parametrize(
