@@ -1,1 +1,1 @@
-
+"""Accepts missions, keeps them, has the stages plan them, and publishes status, plans and replans."""
