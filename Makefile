@@ -18,8 +18,9 @@ setup: $(READY) ## Make .venv with the pinned dependencies and Oxbow itself (edi
 
 run: $(READY) ## Plan the example mission through the embedded stack.
 	@mkdir -p out
-	$(BIN)/oxbow plan docs/examples/lake.json --output out/lake.json --home out/home
+	$(BIN)/oxbow plan docs/examples/lake.json --output out/lake.json --record out/lake.rrd
 	$(BIN)/oxbow picture out/lake.json --output out/lake.png
+	@echo "picture       out/lake.png"
 
 test: lint types imports pytest ## Lint, types, import rules and all tests.
 

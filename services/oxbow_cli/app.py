@@ -242,9 +242,12 @@ def picture(
     Example: `oxbow picture lake.json -o lake.png`
     """
     from oxbow.mission import read_mission
+    from oxbow_cli.arguments import writing
     from oxbow_cli.picture import draw
 
-    draw(read_mission(file), output)
+    mission = read_mission(file)
+    with writing(output):
+        draw(mission, output)
 
 
 @app.command()

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from oxbow.bus import DEFAULT_ENDPOINT
@@ -14,7 +15,7 @@ from oxbow.frame import Position
 from oxbow.mission import Mission, write_mission
 from oxbow.plan import PlanOptions
 
-__all__ = ["endpoint", "plan_options", "position", "replica_counts", "require_compatible", "save"]
+__all__ = ["endpoint", "plan_options", "position", "replica_counts", "require_compatible", "save", "writing"]
 
 
 _ENDPOINT = re.compile(r"[a-z][a-z0-9_-]*/\S+")
@@ -70,7 +71,14 @@ def require_compatible(*, local: bool, connect: str | None, record: Path | None)
 
 def save(path: Path, mission: Mission) -> None:
     """Write a Mission File as a whole, or leave the old one as it was."""
-    try:
+    with writing(path):
         write_mission(path, mission)
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Report a file that cannot be written as a fault of what was asked."""
+    try:
+        yield
     except OSError as error:
         raise InvalidMission(f"cannot be written: {error.strerror or error}", where=str(path)) from error

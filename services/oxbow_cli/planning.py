@@ -16,10 +16,11 @@ from typing import TypeVar
 
 from oxbow.client import Client
 from oxbow.contracts import STAGES, Endpoint, Message, MissionStatus
-from oxbow.errors import DeadlineExceeded, InvalidMission
+from oxbow.errors import DeadlineExceeded
 from oxbow.mission import Mission
 from oxbow.pipeline import Call, plan_mission
 from oxbow.plan import PlanOptions
+from oxbow_cli.arguments import writing
 from oxbow_cli.exits import DEBUG
 from oxbow_cli.local import local_call
 from oxbow_cli.stack import StackSettings, free_endpoint, running_stack
@@ -88,23 +89,19 @@ def plan_embedded(job: Job, recording: Path | None, recordings: Path) -> Planned
     recording
         Where the recording goes; where absent, into the folder `recordings` under the mission's id.
     """
-    _make_folder(recordings if recording is None else recording.parent)
-    with tempfile.TemporaryDirectory(prefix="oxbow-") as folder:
-        settings = StackSettings(endpoint=free_endpoint(), home=Path(folder), recordings=Path(folder))
+    folder = recordings if recording is None else recording.parent
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="oxbow-") as scratch:
+        settings = StackSettings(endpoint=free_endpoint(), home=Path(scratch), recordings=Path(scratch))
         with running_stack(settings, output=None if DEBUG in os.environ else subprocess.DEVNULL):
             planned = plan_on(job, settings.endpoint).mission
-        # The recorder has closed its file by now.
+        # The recorder has closed its file by now; where it failed, the plan is worth having all the same.
         assert planned.plan is not None
-        made = Path(folder) / f"{planned.plan.mission_id}.rrd"
+        made = Path(scratch) / f"{planned.plan.mission_id}.rrd"
+        if not made.exists():
+            return Planned(planned)
         return Planned(planned, Path(shutil.move(made, recording or recordings / made.name)))
-
-
-def _make_folder(folder: Path) -> None:
-    """Find out before planning that a recording could not be kept."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidMission(f"cannot be made: {error.strerror}", where=str(folder)) from error
 
 
 class _Reported:

@@ -57,10 +57,9 @@ def print_plan(planned: Planned, file: Path) -> None:
     plan = planned.mission.plan
     assert plan is not None
     Console().print(_plan_table(planned.mission.site_name or file.name, plan))
-    print("mission file", file, sep="  ")
+    print(f"mission file  {file}")
     if planned.recording is not None:
-        print("recording   ", planned.recording, sep="  ")
-        print("open it with", f"oxbow inspect {shlex.quote(str(planned.recording))}", sep="  ")
+        print(f"recording     {planned.recording} (oxbow inspect {shlex.quote(str(planned.recording))})")
 
 
 def _plan_table(site: str, plan: PlanRecord) -> Table:

@@ -11,8 +11,6 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
-from oxbow.errors import Unavailable
-
 __all__ = ["Child", "Supervisor"]
 
 GRACE_S = 10.0
@@ -104,12 +102,10 @@ class Supervisor:
         """Start a child; those of the highest rank are stopped first."""
         self.children.append(Child(name, arguments, rank, self._output))
 
-    def require_alive(self) -> None:
-        """Raise `Unavailable` where a child has ended."""
-        for child in self.children:
-            status = child.process.poll()
-            if status is not None:
-                raise Unavailable(f"ended with status {status} before it was ready", where=child.name)
+    def ended(self) -> dict[str, int]:
+        """The exit status of each child that has ended, by name."""
+        statuses = {child.name: child.process.poll() for child in self.children}
+        return {name: status for name, status in statuses.items() if status is not None}
 
     def keep_alive(self) -> None:
         """From now on, start children again that end."""

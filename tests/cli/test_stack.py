@@ -73,6 +73,15 @@ def test_plan_over_a_stack_of_its_own(oxbow, folder):
     assert "oxbow inspect" in result.stdout
 
 
+def test_a_recorder_that_does_not_start_costs_the_recording_alone(oxbow, folder):
+    (folder / "oxbow_recorder.py").write_text("raise SystemExit(3)")
+    result = oxbow("plan", "pond.json", PYTHONPATH=str(folder))
+    assert result.returncode == 0, result.stderr
+    assert "without recordings" in result.stderr
+    assert "recording" not in result.stdout
+    assert not list(folder.glob("**/*.rrd"))
+
+
 def test_a_fault_of_the_mission_is_told_as_without_the_bus(oxbow, folder, pond):
     (folder / "pond.json").write_text(json.dumps(pond(Safety=500.0)))
     over_the_bus, here = oxbow("plan", "pond.json"), oxbow("plan", "pond.json", "--local")
