@@ -27,6 +27,11 @@ __all__ = ["plan_document", "print_evaluation", "print_json", "print_plan", "pri
 Rows = Iterable[tuple[str, str]]
 
 
+def _console() -> Console:
+    """Stdout, on which a site's name or an error is plain text, whatever it contains."""
+    return Console(markup=False, emoji=False, highlight=False)
+
+
 def print_json(document: Any) -> None:
     """Write a document to stdout as indented JSON."""
     print(msgspec.json.format(msgspec.json.encode(document, enc_hook=os.fspath), indent=2).decode())
@@ -56,7 +61,7 @@ def print_plan(planned: Planned, file: Path) -> None:
     """Write a plan's table to stdout, and where its files are: one a line, never wrapped, to be copied."""
     plan = planned.mission.plan
     assert plan is not None
-    Console().print(_plan_table(planned.mission.site_name or file.name, plan))
+    _console().print(_plan_table(planned.mission.site_name or file.name, plan))
     print(f"mission file  {file}")
     if planned.recording is not None:
         print(f"recording     {planned.recording} (oxbow inspect {shlex.quote(str(planned.recording))})")
@@ -87,7 +92,7 @@ def print_evaluation(site: str, found: Evaluation) -> None:
     for name, value in msgspec.structs.asdict(found).items():
         text = _place(value) if name == "worst_gap" and value is not None else _figure(value)
         rows.append((name, text))
-    Console().print(_table(f"Evaluation of {site}", rows))
+    _console().print(_table(f"Evaluation of {site}", rows))
 
 
 def print_status(found: StackStatus) -> None:
@@ -104,7 +109,7 @@ def print_status(found: StackStatus) -> None:
         missions.add_row(
             mission.mission_id, mission.state.value, mission.stage, error, str(mission.revision), f"{done:.0%}"
         )
-    Console().print(processes, missions)
+    _console().print(processes, missions)
 
 
 _PROCESS_FIGURES = ("up", "served", "failed", "queued", "mean", "p95", "memory")
@@ -139,13 +144,13 @@ def _table(title: str, rows: Rows) -> Table:
 
 def _quality(radius_m: tuple[float, float], least_m: float, q: float, p95_ratio: float) -> Rows:
     low_m, high_m = radius_m
-    yield "farthest water", f"{low_m:.1f} to {high_m:.1f} m from the path (any path: {least_m:.1f} m or more)"
-    yield "q", f"{q:.2f} times the least possible radius; 95 % of the water within {p95_ratio:.2f} times"
+    yield "farthest water", f"{low_m:.1f} to {high_m:.1f} m from the path; least possible {least_m:.1f} m"
+    yield "q", f"{q:.2f} (farthest / least possible); {p95_ratio:.2f} for 95 % of the water"
 
 
 def _conformance(is_simple: bool, outside_m: float, unsafe_m: float) -> str:
     simple = "never crosses itself" if is_simple else "CROSSES ITSELF"
-    return f"{simple}; {outside_m:.2f} m outside the water, {unsafe_m:.2f} m nearer than Safety"
+    return f"{simple}; {outside_m:.2f} m outside, {unsafe_m:.2f} m within Safety"
 
 
 def _share(plan: PlanRecord) -> str:

@@ -15,6 +15,11 @@ def test_completes_the_file_and_keeps_what_it_does_not_know(oxbow, folder):
     assert mission["Plan"]["method"] == "Transect"
 
 
+def test_a_name_is_plain_text(oxbow, folder, pond):
+    (folder / "pond.json").write_text(json.dumps(pond(SiteName="Pond [red] :fish: [/]")))
+    assert "Plan of Pond [red] :fish: [/]" in oxbow("plan", "pond.json", "--local").stdout
+
+
 def test_writes_elsewhere_when_asked(oxbow, folder):
     before = (folder / "pond.json").read_bytes()
     result = oxbow("plan", "pond.json", "--local", "-o", "planned.json", "--json", "--heading", 30, "--seed", 7)
