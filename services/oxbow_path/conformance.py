@@ -1,0 +1,40 @@
+"""The last check of a path before it leaves: what may never be wrong is verified, not trusted."""
+
+from __future__ import annotations
+
+import shapely
+from shapely import LineString, Point
+
+from oxbow.contracts import PathRequest
+from oxbow.errors import Internal
+
+__all__ = ["require_conforming"]
+
+ROUNDING_M = 1e-6
+"""Turning into the sweep frame and back moves points by far less."""
+
+
+def require_conforming(path: LineString, request: PathRequest) -> None:
+    """Check that a path is simple, no longer than allowed, and inside the free space but for its legs.
+
+    Raises
+    ------
+    Internal
+        It is not: a fault of the planner, which must not reach a vehicle.
+    """
+    if not path.is_simple:
+        raise Internal("the planned path crosses itself", "path")
+    if path.length > request.length_m:
+        raise Internal(f"the planned path is {path.length:.1f} m long, of {request.length_m:.1f} m", "path")
+    outside = shapely.get_parts(path.difference(request.space.free.buffer(ROUNDING_M)))
+    ends = [Point(request.launch), Point(request.recovery)]
+    stray = [
+        line for line in outside if line.length > ROUNDING_M and not any(shapely.dwithin(line, ends, ROUNDING_M))
+    ]
+    if stray:
+        place = stray[0].interpolate(0.5, normalized=True)
+        raise Internal(
+            f"the planned path leaves the free space for {sum(line.length for line in stray):.3f} m,"
+            f" near ({place.x:.1f}, {place.y:.1f})",
+            "path",
+        )

@@ -1,0 +1,29 @@
+"""Water that a path leaves farther away than it means to."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from shapely import LineString, Polygon
+
+from oxbow.contracts import DroppedPart
+
+__all__ = ["dropped_parts"]
+
+LEAST_SHARE = 0.01
+"""Smaller parts than this share of a square of side `reach_m` are not worth a line."""
+
+
+def dropped_parts(path: LineString, free: Polygon, reach_m: float) -> tuple[DroppedPart, ...]:
+    """The parts of the free space farther than `reach_m` from the path, the largest first."""
+    rest = shapely.get_parts(free.difference(path.buffer(reach_m)))
+    rest = rest[shapely.area(rest) > LEAST_SHARE * reach_m**2]
+    return tuple(
+        DroppedPart(
+            area_m2=float(part.area),
+            reason=f"farther than {reach_m:.0f} m from the path: going there is not worth its length",
+            place=(float(place.x), float(place.y)),
+            outline=part,
+        )
+        for part, place in ((part, part.representative_point()) for part in rest[np.argsort(-shapely.area(rest))])
+    )

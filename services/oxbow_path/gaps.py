@@ -1,0 +1,93 @@
+"""Gaps: water farther from the path than it may be, and the branches that reach it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+from shapely import LineString, Point, Polygon
+
+from oxbow.contracts import FloatArray
+from oxbow_path.probe import Probe
+from oxbow_path.routes import Routes
+from oxbow_path.walk import Walk, band, grown, largest, simply_connected
+
+__all__ = ["branch_to", "reach_gaps"]
+
+ROUNDS = 6
+
+
+def reach_gaps(
+    walk: Walk, probe: Probe, routes: Routes, *, reach_m: float, half_width_m: float, cut_width_m: float
+) -> Walk:
+    """Grow branches into the gaps, worst first, until none is deeper than `reach_m` (or `ROUNDS` are over).
+
+    Outside the region, a gap is reached by a branch, which is walked on both sides: it costs twice its length.
+    Inside it, where bands have merged, the gap is opened by a slit from the boundary.
+    """
+    for _ in range(ROUNDS):
+        distance = probe.distances([walk.ring])
+        worst_first = np.argsort(-distance)
+        gaps = probe.points[worst_first[: np.count_nonzero(distance > reach_m)]]
+        if len(gaps) == 0:
+            break
+        inside = shapely.contains_xy(walk.region, gaps[:, 0], gaps[:, 1])
+        apart_m = reach_m + half_width_m
+        slits = [
+            shapely.buffer(_lengthened(shapely.shortest_line(Point(gap), walk.ring), cut_width_m), cut_width_m / 2)
+            for gap in _spread(gaps[inside], apart_m)
+        ]
+        branches = list(_branches(gaps[~inside], walk.region, routes, apart_m, half_width_m))
+        region = largest(
+            grown(walk.region, band(branches, half_width_m), routes.water).difference(shapely.union_all(slits))
+        )
+        walk = simply_connected(region, probe, cut_width_m=cut_width_m, reach_m=reach_m)
+    return walk
+
+
+def _spread(points: FloatArray, apart_m: float) -> Iterator[FloatArray]:
+    """The first point, and each later one that is at least `apart_m` from those before."""
+    index = cKDTree(points)
+    taken = np.zeros(len(points), dtype=bool)
+    for number, point in enumerate(points):
+        if not taken[number]:
+            taken[index.query_ball_point(point, apart_m)] = True
+            yield point
+
+
+def _branches(
+    gaps: FloatArray, region: Polygon, routes: Routes, apart_m: float, overlap_m: float
+) -> Iterator[LineString]:
+    """A branch for each gap that no earlier branch of this round has come near."""
+    index = cKDTree(gaps)
+    reached = np.zeros(len(gaps), dtype=bool)
+    for number, gap in enumerate(gaps):
+        if reached[number]:
+            continue
+        branch = branch_to(gap, region, routes, overlap_m)
+        yield branch
+        steps = shapely.get_coordinates(shapely.segmentize(branch, apart_m / 4)) if branch.length else gap[None]
+        for near in index.query_ball_point(steps, apart_m):
+            reached[near] = True
+        reached[number] = True
+
+
+def branch_to(gap: FloatArray, region: Polygon, routes: Routes, overlap_m: float) -> LineString:
+    """From a gap straight to the region where the water allows, else along the middle of the water."""
+    straight = shapely.shortest_line(Point(gap), region)
+    if shapely.covers(routes.water, straight):
+        return _lengthened(straight, overlap_m)
+    shapely.prepare(region)
+    route = routes.route(
+        (float(gap[0]), float(gap[1])), lambda xy: shapely.contains_xy(region, xy[:, 0], xy[:, 1])
+    )
+    return straight if route is None else route
+
+
+def _lengthened(line: LineString, extra_m: float) -> LineString:
+    """A segment whose second end is moved on by `extra_m`."""
+    (start, end) = shapely.get_coordinates(line)
+    length = np.hypot(*(end - start))
+    return line if length == 0 else LineString([start, end + (end - start) * (extra_m / length)])

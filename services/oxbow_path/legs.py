@@ -1,0 +1,167 @@
+"""Legs: from the launch point to the ring, and from the ring to the recovery point.
+
+Equal points give one closed ring: out at one place, back in beside it. Points apart give an open path that still
+travels the whole ring: round one side of the region from launch to recovery, back through its middle, and
+round the other side. (The report, Rendas and Li 2016, section 1.2.1.2, treats only equal points.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely import LinearRing, LineString, Point, Polygon
+from shapely.ops import substring
+
+from oxbow.contracts import FloatArray, Place
+from oxbow.errors import Infeasible, Internal
+from oxbow_path.routes import Routes
+from oxbow_path.walk import largest
+
+__all__ = ["Access", "access", "joined"]
+
+HALVINGS = 12
+"""How often the opening of the ring may be halved until the legs fit."""
+
+
+@dataclass(frozen=True)
+class Access:
+    """How a launch or recovery point is reached: `leg` runs from it to the free space, through the water.
+
+    A point inside the free space has a leg of no length.
+    """
+
+    leg: FloatArray
+
+    @property
+    def place(self) -> Place:
+        """The point itself."""
+        return float(self.leg[0, 0]), float(self.leg[0, 1])
+
+    @property
+    def entry(self) -> Point:
+        """Where the leg meets the free space."""
+        return Point(self.leg[-1])
+
+
+def access(place: Place, free: Polygon, water: Routes, where: str) -> Access:
+    """The shortest leg from a launch or recovery point to the free space.
+
+    Straight where the water allows, or where the point lies ashore; else round the shore.
+    """
+    point = Point(place)
+    if free.covers(point):
+        return Access(np.array([place, place]))
+    straight = shapely.shortest_line(point, free)
+    if water.water.covers(straight) or not water.water.covers(point):
+        return Access(shapely.get_coordinates(straight))
+    route = water.route(place, lambda xy: shapely.contains_xy(free, xy[:, 0], xy[:, 1]))
+    if route is None:
+        raise Infeasible(f"no way through the water leads from {place} to the free space", where)
+    outside = shapely.get_parts(route.difference(free))[0]
+    return Access(shapely.get_coordinates(outside))
+
+
+def joined(region: Polygon, launch: Access, recovery: Access, opening_m: float) -> LineString:
+    """The path: leg, ring, leg.
+
+    Parameters
+    ----------
+    region
+        The walk's region; both entries lie in it or on its boundary.
+    launch, recovery
+        How the two points are reached.
+    opening_m
+        Width of the ring's opening; halved until the legs fit through without a crossing.
+
+    Raises
+    ------
+    Internal
+        No opening gives a simple path: a fault of the construction.
+    """
+    for path in _candidates(region, launch, recovery, opening_m):
+        if path.is_simple:
+            return path
+    raise Internal(f"the legs from {launch.place} and to {recovery.place} do not fit the ring", "legs")
+
+
+def _candidates(region: Polygon, launch: Access, recovery: Access, opening_m: float) -> Iterator[LineString]:
+    opening_m = min(opening_m, region.exterior.length / 8)
+    for _ in range(HALVINGS):
+        if launch.place == recovery.place:
+            yield from _closed(region.exterior, launch, opening_m)
+        elif shapely.dwithin(recovery.entry, region.exterior, opening_m / 8) and not shapely.dwithin(
+            launch.entry, region.exterior, opening_m / 8
+        ):
+            yield from (path.reverse() for path in _open(region, recovery, launch, opening_m))
+        else:
+            yield from _open(region, launch, recovery, opening_m)
+        opening_m /= 2
+
+
+def _closed(ring: LinearRing, launch: Access, opening_m: float) -> Iterator[LineString]:
+    """Out to the ring, round it, and back beside the way out."""
+    line = LineString(ring)
+    at = line.project(launch.entry)
+    round_trip = _part(line, at + opening_m / 2, at - opening_m / 2)
+    for side in (1.0, -1.0):
+        back = _beside(launch.leg, opening_m, side)[::-1]
+        yield _chain(launch.leg[:-1], round_trip, back)
+        yield _chain(launch.leg[:-1], round_trip[::-1], back)
+
+
+def _beside(leg: FloatArray, offset_m: float, side: float) -> FloatArray:
+    """The leg's inner vertices, moved aside by a share of the offset that grows from 0 at its start."""
+    steps = np.hypot(*np.diff(leg, axis=0).T)
+    if len(leg) <= 2 or steps.sum() == 0:
+        return leg[:1]
+    share = np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
+    tangent = np.gradient(leg, axis=0)
+    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]]) / np.hypot(*tangent.T)[:, None]
+    return np.asarray((leg + side * offset_m * share[:, None] * normal)[:-1])
+
+
+def _open(region: Polygon, launch: Access, recovery: Access, opening_m: float) -> Iterator[LineString]:
+    """Round the ring, and through the region to the recovery point.
+
+    Where the recovery point lies inside the region, the whole ring is travelled first. Otherwise the way
+    through the region divides the ring: one side, back through the middle, the other side.
+    """
+    line = LineString(region.exterior)
+    start, end = line.project(launch.entry), line.project(recovery.entry)
+    out = np.vstack([launch.leg, shapely.get_coordinates(line.interpolate(start))])
+    through = Routes(_without(region, out, opening_m / 16), opening_m * 4)
+    if not shapely.dwithin(recovery.entry, line, opening_m / 8):
+        ring = _part(line, start, start - opening_m)
+        way = through.between(ring[-1], recovery.leg[-1])
+        yield _chain(out, ring, way, recovery.leg[::-1])
+        return
+    near, far = _part(line, start, end), _part(line, end + opening_m, start - opening_m)
+    way = through.between(near[-1], far[-1])
+    yield _chain(out, near, way, far[::-1], recovery.leg[::-1])
+
+
+def _without(region: Polygon, leg: FloatArray, half_width_m: float) -> Polygon:
+    """The region less the leg, should it run inside."""
+    line = LineString(leg)
+    if line.length == 0 or not region.intersects(line):
+        return region
+    return largest(region.difference(line.buffer(half_width_m)))
+
+
+def _part(ring: LineString, start_m: float, end_m: float) -> FloatArray:
+    """The stretch of a closed line from one distance along it onward to another, round the seam where need be."""
+    start_m, end_m = start_m % ring.length, end_m % ring.length
+    if start_m < end_m:
+        return shapely.get_coordinates(substring(ring, start_m, end_m))
+    first, second = substring(ring, start_m, ring.length), substring(ring, 0.0, end_m)
+    return np.vstack([shapely.get_coordinates(first), shapely.get_coordinates(second)])
+
+
+def _chain(*parts: FloatArray) -> LineString:
+    """One line through all parts, without repeated points."""
+    points = np.vstack(parts)
+    keep = np.concatenate([[True], np.any(np.diff(points, axis=0) != 0, axis=1)])
+    return LineString(points[keep])

@@ -1,0 +1,103 @@
+"""The Transect planner: several patterns, each fitted to the length, and the best path of all."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import shapely
+
+from oxbow.contracts import PathRequest
+from oxbow.errors import Infeasible
+from oxbow.sweep import to_sweep
+from oxbow_path.legs import access
+from oxbow_path.probe import Probe
+from oxbow_path.routes import Routes
+from oxbow_path.spacing import Budget, fitted
+from oxbow_path.transect import Pattern, Trial, Waters, try_pattern
+
+__all__ = ["TransectPlan", "plan_transects"]
+
+LENGTH_USED = (0.97, 0.999)
+"""Shares of the longest length that a path should use."""
+
+ACCEPTED = 0.95
+"""Share of the longest length below which a plan says why it does not use more (report: 5 %)."""
+
+FIRST_SPACING = 1.15
+"""The first spacing tried, as a multiple of area / length: turns and ways back cost about as much."""
+
+REACHES = (1.5, 1.3, 1.8)
+PHASES = (0.25, 0.75)
+PROBE_PITCH = 0.5
+"""Pitch of the probe grid, in nominal spacings."""
+
+
+@dataclass(frozen=True)
+class TransectPlan:
+    """The chosen trial and all others, in the order of trying; sweep frame."""
+
+    waters: Waters
+    chosen: Trial
+    trials: tuple[Trial, ...]
+
+
+def plan_transects(request: PathRequest) -> TransectPlan:
+    """Plan a Transect path.
+
+    Raises
+    ------
+    Infeasible
+        Even the shortest way from launch to recovery is longer than the vehicle can go.
+    """
+    nominal_m = request.space.free.area / request.length_m
+    waters = _waters(request, max(nominal_m, request.min_spacing_m))
+    enough, most = (share * request.length_m for share in LENGTH_USED)
+    budget = Budget(most, enough, request.min_spacing_m)
+    trials = tuple(_trials(waters, budget, FIRST_SPACING * nominal_m))
+    fitting = [trial for trial in trials if budget.fits(trial.length_m)]
+    if not fitting:
+        shortest = min(trial.length_m for trial in trials)
+        raise Infeasible(
+            f"the longest path allowed is {request.length_m:.0f} m, the shortest found {shortest:.0f} m",
+            "Master_length",
+        )
+    return TransectPlan(waters, min(fitting, key=lambda trial: _score(trial, waters, budget)), trials)
+
+
+def _trials(waters: Waters, budget: Budget, first_spacing_m: float) -> Iterator[Trial]:
+    spacing_m = first_spacing_m
+    for reach, phase in itertools.product(REACHES, PHASES):
+        for trial in fitted(partial(try_pattern, waters), Pattern(spacing_m, reach, phase), budget):
+            spacing_m = trial.pattern.spacing_m
+            yield trial
+
+
+def _score(trial: Trial, waters: Waters, budget: Budget) -> float:
+    """The sum of the largest and the 95th percentile of the distance to the path, over that of a perfect plan.
+
+    A path much shorter than allowed is charged for what it leaves unused.
+    """
+    distance = waters.probe.distances([trial.path])
+    unused = max(0.0, budget.enough_m / trial.length_m - 1.0)
+    return float(distance.max() + np.quantile(distance, 0.95)) * (1.0 + unused)
+
+
+def _waters(request: PathRequest, spacing_m: float) -> Waters:
+    """Turn the request into the sweep frame, and prepare what all trials share."""
+    turn = partial(to_sweep, heading_rad=request.decomposition.heading_rad)
+    free, water = (shapely.transform(polygon, turn) for polygon in (request.space.free, request.space.water))
+    shapely.prepare([free, water])
+    shore = Routes(water, spacing_m)
+    (launch, recovery) = turn(np.array([request.launch, request.recovery]))
+    return Waters(
+        cells=request.decomposition.cells,
+        free=free,
+        probe=Probe.over(free, PROBE_PITCH * spacing_m),
+        routes=Routes(free, PROBE_PITCH * spacing_m),
+        launch=access(tuple(launch), free, shore, "LaunchPoint"),
+        recovery=access(tuple(recovery), free, shore, "RecoveryPoint"),
+    )

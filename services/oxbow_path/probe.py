@@ -1,0 +1,57 @@
+"""Probe points of the free space, and their distances to a path."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from oxbow.contracts import FloatArray
+
+__all__ = ["Probe"]
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A grid over the free space and its shore, `pitch_m` apart.
+
+    Distances measured on it err by at most `pitch_m` in all: half a cell's diagonal between its points, and an
+    eighth of the pitch for the path, which is walked in small steps.
+    """
+
+    points: FloatArray
+    pitch_m: float
+
+    @classmethod
+    def over(cls, free: Polygon, pitch_m: float) -> Probe:
+        """Cover `free` (prepared or not) by a grid, and its shore by points as dense."""
+        x0, y0, x1, y1 = free.bounds
+        grid = np.meshgrid(np.arange(x0 + pitch_m / 2, x1, pitch_m), np.arange(y0 + pitch_m / 2, y1, pitch_m))
+        xy = np.column_stack([axis.ravel() for axis in grid])
+        inside = xy[shapely.contains_xy(free, xy[:, 0], xy[:, 1])]
+        shore = shapely.get_coordinates(shapely.segmentize(free.boundary, pitch_m))
+        return cls(np.vstack([inside, shore]), pitch_m)
+
+    @cached_property
+    def _tree(self) -> shapely.STRtree:
+        return shapely.STRtree(np.asarray(shapely.points(self.points)))
+
+    def within(self, area: Polygon) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+        """Indices of the points inside an area."""
+        return self._tree.query(area, predicate="contains")
+
+    def distances(self, lines: Iterable[BaseGeometry], points: FloatArray | None = None) -> FloatArray:
+        """Distance of every probe point (or of `points`) to the nearest of some lines, shape (n,)."""
+        steps = shapely.get_coordinates(shapely.segmentize(np.asarray(list(lines)), self.pitch_m / 4))
+        distance, _ = cKDTree(steps).query(self.points if points is None else points)
+        return np.asarray(distance)
+
+    def farthest(self, points: FloatArray, lines: Iterable[BaseGeometry]) -> float:
+        """The largest distance from `points` to the nearest of some lines; 0 where there are none."""
+        return float(self.distances(lines, points).max()) if len(points) else 0.0

@@ -1,0 +1,147 @@
+"""The Transect method at one spacing: circuit, walk, gaps, legs (Rendas and Li 2016, section 1.2.1.1)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import shapely
+from shapely import LineString, Point, Polygon
+
+from oxbow.contracts import Cell
+from oxbow_path.circuit import Circuit, plan_circuit
+from oxbow_path.gaps import branch_to, reach_gaps
+from oxbow_path.legs import Access, joined
+from oxbow_path.probe import Probe
+from oxbow_path.routes import Routes
+from oxbow_path.transects import place_transects
+from oxbow_path.walk import Walk, band, dilated, grown, largest, simply_connected
+
+__all__ = ["Pattern", "Trial", "Waters", "try_pattern"]
+
+LEAST_TRANSECT = 2.0
+"""In spacings. Where the water is narrower, out and back along its middle is shorter than transects across."""
+
+TRIM = 0.8
+"""Share of the tolerable distance to the shore that a transect stops short of it."""
+
+CUT = 0.25
+"""Width of a cut through the region, in spacings."""
+
+STRAIGHTENING = 0.05
+"""How far the walk may be moved to straighten it, in spacings."""
+
+
+@dataclass(frozen=True)
+class Waters:
+    """All that stays the same while the spacing is sought; geometry in the sweep frame."""
+
+    cells: tuple[Cell, ...]
+    free: Polygon
+    probe: Probe
+    routes: Routes
+    launch: Access
+    recovery: Access
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """What is tried: the spacing of the path's parallel legs and how far water may stay from the path.
+
+    `reach` is the largest distance from a point of the water to the path that is left alone, as a multiple of
+    half the spacing; `phase` shifts the transects by a share of their pitch.
+    """
+
+    spacing_m: float
+    reach: float
+    phase: float
+
+    @property
+    def half_width_m(self) -> float:
+        return self.spacing_m / 2
+
+    @property
+    def reach_m(self) -> float:
+        return self.reach * self.half_width_m
+
+    @property
+    def trim_m(self) -> float:
+        """How far short of the shore a transect stops, so that the shore between two stays within reach."""
+        return TRIM * self.half_width_m * min(1.0, math.sqrt(self.reach**2 - 1.0))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A path for one pattern, and what led to it; geometry in the sweep frame."""
+
+    pattern: Pattern
+    circuit: Circuit
+    walk: Walk
+    path: LineString
+
+    @property
+    def length_m(self) -> float:
+        return float(self.path.length)
+
+
+def try_pattern(waters: Waters, pattern: Pattern) -> Trial:
+    """Build the path for one pattern.
+
+    The tree is made of transects two spacings apart, so that the legs on their two sides stand one spacing apart.
+    """
+    transects = place_transects(
+        waters.cells,
+        2 * pattern.spacing_m,
+        phase=pattern.phase,
+        min_length_m=LEAST_TRANSECT * pattern.spacing_m,
+    )
+    circuit = plan_circuit(
+        waters.cells,
+        transects,
+        trim_m=pattern.trim_m,
+        inset_m=pattern.half_width_m + pattern.trim_m,
+    )
+    cut_m = CUT * pattern.spacing_m
+    region = _started(waters, circuit, pattern.half_width_m)
+    walk = simply_connected(region, waters.probe, cut_width_m=cut_m, reach_m=pattern.reach_m)
+    walk = reach_gaps(
+        walk,
+        waters.probe,
+        waters.routes,
+        reach_m=pattern.reach_m,
+        half_width_m=pattern.half_width_m,
+        cut_width_m=cut_m,
+    )
+    region = _straightened(walk.region, waters, STRAIGHTENING * pattern.spacing_m)
+    region = _accessible(region, waters, pattern.half_width_m)
+    path = joined(region, waters.launch, waters.recovery, cut_m)
+    return Trial(pattern, circuit, Walk(region, walk.cuts, walk.enclosed), path)
+
+
+def _started(waters: Waters, circuit: Circuit, half_width_m: float) -> Polygon:
+    """The circuit's region; water too narrow for any transect starts from the launch point's entry."""
+    if circuit.transects:
+        return dilated(circuit, waters.free, half_width_m)
+    return largest(waters.launch.entry.buffer(half_width_m).intersection(waters.free))
+
+
+def _straightened(region: Polygon, waters: Waters, tolerance_m: float) -> Polygon:
+    """The region with fewer vertices, still inside the free space, and unchanged near the entries."""
+    simple = region.simplify(tolerance_m).intersection(waters.free)
+    kept = shapely.union_all(
+        [entry.buffer(4 * tolerance_m) for entry in (waters.launch.entry, waters.recovery.entry)]
+    )
+    return Polygon(largest(simple.union(region.intersection(kept))).exterior)
+
+
+def _accessible(region: Polygon, waters: Waters, half_width_m: float) -> Polygon:
+    """The region grown to the launch and recovery points' entries; holes that this makes are enclosed."""
+    for entry in (waters.launch.entry, waters.recovery.entry):
+        if not _touches(region, entry):
+            branch = branch_to(shapely.get_coordinates(entry)[0], region, waters.routes, half_width_m)
+            region = Polygon(grown(region, band([branch], half_width_m), waters.free).exterior)
+    return region
+
+
+def _touches(region: Polygon, entry: Point) -> bool:
+    return bool(shapely.dwithin(region, entry, 1e-6))

@@ -1,0 +1,136 @@
+"""The walk round a tree: a region without holes whose boundary is the path.
+
+Dilate a connected set of lines inside the free space by half a spacing, clip it by the free space, and open
+whatever holes remain: the boundary of what results is one closed curve, inside, that never crosses itself, by
+construction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely import LinearRing, LineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from oxbow_path.circuit import Circuit
+from oxbow_path.probe import Probe
+
+__all__ = ["Walk", "band", "dilated", "grown", "largest", "simply_connected"]
+
+NARROWINGS = 8
+AREA_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A simply connected region and how it became so."""
+
+    region: Polygon
+    cuts: tuple[LineString, ...] = ()
+    enclosed: tuple[Polygon, ...] = ()
+
+    @property
+    def ring(self) -> LinearRing:
+        """The closed path: the region's boundary."""
+        return self.region.exterior
+
+
+def largest(geometry: BaseGeometry) -> Polygon:
+    """The largest polygon of a geometry."""
+    parts = shapely.get_parts(geometry)
+    polygons = parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON]
+    return Polygon() if len(polygons) == 0 else polygons[np.argmax(shapely.area(polygons))]
+
+
+def dilated(circuit: Circuit, free: Polygon, half_width_m: float) -> Polygon:
+    """The circuit's lines, dilated and clipped.
+
+    Transects get flat ends, so that a trimmed one stays short of the shore; links reach over what they join.
+    """
+    transects = shapely.buffer(np.asarray(circuit.transects), half_width_m, cap_style="flat")
+    links = band(circuit.links, half_width_m)
+    return largest(shapely.union_all([*transects, *links]).intersection(free))
+
+
+def band(lines: Sequence[LineString], half_width_m: float) -> list[Polygon]:
+    """Lines dilated with square ends and sharp, but not spiky, corners: few waypoints."""
+    bands = shapely.buffer(
+        np.asarray(lines), half_width_m, cap_style="square", join_style="mitre", mitre_limit=1.5
+    )
+    return list(np.atleast_1d(bands))
+
+
+def grown(region: Polygon, bands: Iterable[BaseGeometry], free: Polygon) -> Polygon:
+    """The region with more bands joined to it, clipped by the free space."""
+    return largest(shapely.union_all([region, shapely.union_all(list(bands)).intersection(free)]))
+
+
+def simply_connected(region: Polygon, probe: Probe, *, cut_width_m: float, reach_m: float) -> Walk:
+    """Rid a region of its holes.
+
+    A hole whose water lies within `reach_m` of the remaining boundary is enclosed: its own ring is not worth
+    travelling. Every other hole is opened to the outside by a cut across the region where it is narrowest, so
+    that the path runs round it too.
+    """
+    if not region.interiors:
+        return Walk(region)
+    kept, enclosed = _enclose(region, probe, reach_m)
+    filled = Polygon(region.exterior, kept)
+    cuts = _cuts(filled)
+    opened = _open(filled, cuts, cut_width_m) if cuts else filled
+    return Walk(opened, tuple(cuts), tuple(enclosed))
+
+
+def _enclose(region: Polygon, probe: Probe, reach_m: float) -> tuple[list[LinearRing], list[Polygon]]:
+    """Split the holes into those to keep and those that the rest of the boundary covers well enough."""
+    kept = dict(enumerate(region.interiors))
+    enclosed = []
+    for index in sorted(kept, key=lambda i: Polygon(kept[i]).area):
+        hole = Polygon(kept[index])
+        served = probe.points[probe.within(hole.buffer(reach_m))]
+        rest = [region.exterior, *(ring for i, ring in kept.items() if i != index)]
+        if probe.farthest(served, rest) <= reach_m:
+            del kept[index]
+            enclosed.append(hole)
+    return list(kept.values()), enclosed
+
+
+def _cuts(region: Polygon) -> list[LineString]:
+    """The shortest segments that join every hole to the exterior, by Prim's rule.
+
+    The globally shortest segment from the opened rings to another one crosses no third ring, or that one would be
+    nearer: so it lies inside the region.
+    """
+    holes = np.asarray(region.interiors)
+    if len(holes) == 0:
+        return []
+    nearest = np.full(len(holes), region.exterior)
+    distance = shapely.distance(holes, nearest)
+    opened = np.zeros(len(holes), dtype=bool)
+    cuts = []
+    for _ in range(len(holes)):
+        index = int(np.argmin(np.where(opened, np.inf, distance)))
+        opened[index] = True
+        cuts.append(shapely.shortest_line(nearest[index], holes[index]))
+        closer = shapely.distance(holes, holes[index])
+        update = closer < distance
+        nearest[update] = holes[index]
+        distance = np.minimum(distance, closer)
+    return cuts
+
+
+def _open(region: Polygon, cuts: Sequence[LineString], width_m: float) -> Polygon:
+    """Take the cuts out of the region, narrower where a wide one would cut off more than itself.
+
+    Should a hole remain all the same, it is enclosed: the exterior alone is a path too.
+    """
+    for _ in range(NARROWINGS):
+        slits = shapely.union_all(shapely.buffer(np.asarray(cuts), width_m / 2))
+        opened = largest(region.difference(slits))
+        if not opened.interiors and region.area - opened.area <= slits.area + AREA_TOLERANCE * region.area:
+            return opened
+        width_m /= 2
+    return Polygon(opened.exterior)
