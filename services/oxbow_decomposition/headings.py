@@ -5,20 +5,22 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely import Polygon
 
 from oxbow.contracts import FloatArray, HeadingScore
 from oxbow.sweep import to_sweep
-from oxbow_decomposition.boundary import boundary_walks
 
 __all__ = ["candidate_headings", "predicted_cost", "scored_headings"]
 
-IntArray = npt.NDArray[np.int64]
-
 EVEN_HEADINGS = 16
 SHORE_HEADINGS = 3
+
+DETAIL = 0.25
+"""Bends of the shore smaller than this, in spacings, do not count."""
+
+ACROSS, ALONG = 0.25, 0.75
+"""Metres of path for a metre of shore, fitted to plans of lakes at eight headings each (R2 0.8 within a lake)."""
 
 
 def scored_headings(free: Polygon, spacing_m: float) -> tuple[HeadingScore, ...]:
@@ -31,10 +33,10 @@ def scored_headings(free: Polygon, spacing_m: float) -> tuple[HeadingScore, ...]
     spacing_m
         Distance between neighbouring transects.
     """
-    walks = boundary_walks(free)
-    edges = np.concatenate([np.stack([walk, np.roll(walk, -1, axis=0)], axis=1) for walk in walks])
+    rings = shapely.get_rings(shapely.simplify(free, DETAIL * spacing_m))
+    steps = np.concatenate([np.diff(shapely.get_coordinates(ring), axis=0) for ring in rings])
     return tuple(
-        HeadingScore(heading_rad=heading, predicted_cost=predicted_cost(edges, heading, spacing_m, free.area))
+        HeadingScore(heading_rad=heading, predicted_cost=predicted_cost(steps, heading, spacing_m, free.area))
         for heading in candidate_headings(free)
     )
 
@@ -60,64 +62,28 @@ def _headings(steps: FloatArray) -> FloatArray:
     return np.arctan2(steps[:, 0], steps[:, 1]) % math.pi
 
 
-def predicted_cost(edges: FloatArray, heading_rad: float, spacing_m: float, area_m2: float) -> float:
+def predicted_cost(steps: FloatArray, heading_rad: float, spacing_m: float, area_m2: float) -> float:
     """Metres of path that a square metre of water is expected to take under one heading.
 
-    Transects a spacing D apart are laid over the water, without a decomposition: each meets it in intervals.
-    The forecast adds up
+    The transects themselves take 1 / D. The rest is owed to the shore, and it matters which way the shore runs.
+    Where it runs across the transects, they end at it: turns, and the links from one to the next. Where it
+    runs along them, the last transect stands at an odd distance from it, and what is left between the two has to
+    be reached by branches that are travelled out and back, or is swept twice. So a shore costs `ACROSS` metres of
+    path for each metre across the transects and `ALONG` for each metre along them.
 
-    - the transects themselves, about area / D;
-    - half of every link between neighbours, at the end where the shore is shorter to follow: a link sweeps
-      water too, but half of it is water that the transects it joins have swept. A shore that runs askew
-      across the transects makes links long;
-    - a spacing for each interval that does not continue in exactly one interval on either side:
-      there a cell ends, and the path has to be led around.
-
-    The number of intervals is what Huang 2001 minimises (the sum of altitudes over D); counting them on real
-    transects leaves out inlets that no transect meets.
+    The number of turns, which Huang 2001 minimises, counts the first kind alone: on ragged lakes, where arms
+    are a few spacings wide, it prefers the worse heading.
 
     Parameters
     ----------
-    edges : ndarray, shape (n, 2, 2)
-        The polygon's edges, in planar metres, in any order.
+    steps : ndarray, shape (n, 2)
+        The shore's edges as vectors, in planar metres, without detail finer than a share of the spacing.
     heading_rad
         Direction of the transects, clockwise from north.
     spacing_m
         Distance between neighbouring transects.
     area_m2
-        The polygon's area.
+        The water's area.
     """
-    line, low, high = _intervals(to_sweep(edges, heading_rad), spacing_m)
-    if len(line) == 0:
-        return math.inf
-    onward, next_one = _neighbours(line, low, high, 1)
-    backward, _ = _neighbours(line, low, high, -1)
-    here = np.flatnonzero(onward == 1)
-    there = next_one[here]
-    askew = np.minimum(np.abs(low[there] - low[here]), np.abs(high[there] - high[here]))
-    links = 0.5 * np.hypot(spacing_m, askew).sum()
-    ends = np.abs(onward - 1).sum() + np.abs(backward - 1).sum()
-    return float(((high - low).sum() + links + spacing_m * ends) / area_m2)
-
-
-def _intervals(edges: FloatArray, spacing_m: float) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Where transect lines cross the water: line numbers, and lower and upper ends, in order."""
-    u, v = edges[..., 0] / spacing_m, edges[..., 1]
-    first, last = np.sort(np.ceil(u).astype(np.int64), axis=1).T
-    count = last - first
-    edge = np.repeat(np.arange(len(edges)), count)
-    line = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count) + first[edge]
-    share = (line - u[edge, 0]) / (u[edge, 1] - u[edge, 0])
-    crossing = v[edge, 0] + share * (v[edge, 1] - v[edge, 0])
-    order = np.lexsort((crossing, line))
-    line, crossing = line[order], crossing[order]
-    return line[::2], crossing[::2], crossing[1::2]
-
-
-def _neighbours(line: IntArray, low: FloatArray, high: FloatArray, step: int) -> tuple[IntArray, IntArray]:
-    """How many intervals of the line `step` further on each interval overlaps, and the lowest of them."""
-    height = 2.0 * (high.max() - low.min())
-    base = line * height - low.min()
-    first = np.searchsorted(base + high, base + step * height + low, side="right")
-    last = np.searchsorted(base + low, base + step * height + high, side="left")
-    return np.maximum(last - first, 0), first
+    across_m, along_m = np.abs(to_sweep(steps, heading_rad)).sum(axis=0)
+    return float(1 / spacing_m + (ACROSS * across_m + ALONG * along_m) / area_m2)
