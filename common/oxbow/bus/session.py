@@ -6,7 +6,9 @@ neither numpy nor shapely.
 
 from __future__ import annotations
 
+import atexit
 import logging
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
@@ -32,6 +34,8 @@ __all__ = [
 ]
 
 OPEN_ATTEMPT_S = 1.0
+LINK_LOSS_S = 0.1
+"""How long after the loss of the link to the router a query may still leave over it, unnoticed."""
 
 OnSample = Callable[[str, bytes], None]
 """Called with a sample's key and payload."""
@@ -86,6 +90,10 @@ class Session:
         self._session = session
         self._subscriptions: list[Subscription] = []
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
+        self._asking: set[zenoh.CancellationToken] = set()
+        session.info.declare_transport_events_listener(Callback(self._on_transport, indirect=False))
+        # At exit, zenoh must not call back into an interpreter that is gone.
+        atexit.register(session.close)
 
     @classmethod
     def connect(cls, endpoint: str = DEFAULT_ENDPOINT, *, timeout_s: float = 5.0) -> Self:
@@ -127,6 +135,7 @@ class Session:
         for subscription in self._subscriptions:
             subscription.close()
         self._session.close()
+        atexit.unregister(self._session.close)
 
     def publish(
         self, key: str, payload: bytes, *, encoding: str = JSON, urgent: bool = False, droppable: bool = False
@@ -291,6 +300,8 @@ class Session:
         attachment: bytes | None = None,
     ) -> Iterator[zenoh.Reply]:
         target = zenoh.QueryTarget.ALL if all_targets else zenoh.QueryTarget.BEST_MATCHING
+        cancellation = zenoh.CancellationToken()
+        self._asking.add(cancellation)
         try:
             yield from self._session.get(
                 selector,
@@ -299,9 +310,24 @@ class Session:
                 timeout=timeout_s,
                 target=target,
                 consolidation=zenoh.ConsolidationMode.NONE,
+                cancellation_token=cancellation,
             )
         except zenoh.ZError as error:
-            raise Unavailable(f"cannot ask: {error}", where=selector) from error
+            if not cancellation.is_cancelled:
+                raise Unavailable(f"cannot ask: {error}", where=selector) from error
+        finally:
+            self._asking.discard(cancellation)
+
+    def _on_transport(self, event: zenoh.TransportEvent) -> None:
+        if event.kind == zenoh.SampleKind.DELETE:
+            give_up = threading.Timer(LINK_LOSS_S, self._give_up_asking)
+            give_up.daemon = True
+            give_up.start()
+
+    def _give_up_asking(self) -> None:
+        """End what was asked before the link was lost: zenoh forgets queries that leave at that very moment."""
+        for cancellation in tuple(self._asking):
+            cancellation.cancel()
 
     def _keep(self, subscription: Subscription) -> Subscription:
         self._subscriptions.append(subscription)
