@@ -17,7 +17,7 @@ from echo_stage import ECHO, SQUARE, Deed, EchoRequest
 from oxbow.bus import Bus, BusCall
 from oxbow.bus.router import RouterProcess, free_endpoint, start_router
 from oxbow.contracts import ANY_LAYER, live_key
-from oxbow.errors import Busy, DeadlineExceeded, Infeasible, Internal, Unavailable
+from oxbow.errors import Busy, DeadlineExceeded, Infeasible, Internal, InvalidMission, Unavailable
 
 pytestmark = pytest.mark.processes
 
@@ -166,6 +166,13 @@ def test_closing_delivers_what_was_received_then_refuses(router: RouterProcess, 
 def test_connecting_to_nothing_names_the_endpoint() -> None:
     with pytest.raises(Unavailable, match=r"tcp/127\.0\.0\.1:9: no router answers there within 0\.3 s"):
         Bus.connect("tcp/127.0.0.1:9", timeout_s=0.3)
+
+
+def test_an_endpoint_without_a_protocol_is_refused() -> None:
+    with pytest.raises(
+        InvalidMission, match=r"endpoint: is 'localhost:7447'; expected protocol/address as in tcp/"
+    ):
+        Bus.connect("localhost:7447")
 
 
 def test_ctrl_c_ends_a_program_that_waits_for_the_router() -> None:

@@ -8,7 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from oxbow.bus.config import DEFAULT_ENDPOINT
-from oxbow.bus.session import Session, Subscription
+from oxbow.bus.session import Session
+from oxbow.bus.subscription import Subscription
 from oxbow.envelope import Envelope
 
 if TYPE_CHECKING:

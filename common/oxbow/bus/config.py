@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 import zenoh
 
+from oxbow.errors import InvalidMission
+
 __all__ = ["DEFAULT_ENDPOINT", "client_config", "router_config"]
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+_ENDPOINT = re.compile(r"[a-z0-9]+/\S+")
 
 _COMMON: dict[str, Any] = {
     # Processes meet at the router they are told of, and nowhere else.
@@ -24,6 +28,7 @@ _COMMON: dict[str, Any] = {
 
 def client_config(endpoint: str, timeout_s: float) -> zenoh.Config:
     """Of a process that joins the router at `endpoint`, and joins again when the router comes back."""
+    require_endpoint(endpoint)
     return _config(
         {
             "mode": "client",
@@ -36,7 +41,16 @@ def client_config(endpoint: str, timeout_s: float) -> zenoh.Config:
 
 def router_config(endpoint: str) -> zenoh.Config:
     """Of the router that listens at `endpoint`."""
+    require_endpoint(endpoint)
     return _config({"mode": "router", "listen/endpoints": [endpoint], "scouting/delay": 0})
+
+
+def require_endpoint(endpoint: str) -> None:
+    """Check that an endpoint has a protocol and an address."""
+    if not _ENDPOINT.fullmatch(endpoint):
+        raise InvalidMission(
+            f"is {endpoint!r}; expected protocol/address as in {DEFAULT_ENDPOINT}", where="endpoint"
+        )
 
 
 def _config(settings: dict[str, Any]) -> zenoh.Config:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import zenoh
 
 from oxbow.bus.config import DEFAULT_ENDPOINT, router_config
-from oxbow.errors import Unavailable
+from oxbow.errors import OxbowError, Unavailable
 from oxbow.lifetime import Lifetime
 
 __all__ = ["RouterProcess", "free_endpoint", "run_router", "start_router"]
@@ -105,7 +105,7 @@ def main(argv: list[str] | None = None) -> int:
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s")
     try:
         run_router(options.listen, Lifetime(options.parent), options.ready_fd)
-    except Unavailable as error:
+    except OxbowError as error:
         _log.error("%s", error)
         return 4
     return 0

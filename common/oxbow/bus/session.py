@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Self
 
 import msgspec
 import zenoh
@@ -21,60 +21,16 @@ from zenoh.handlers import Callback
 from oxbow.bus.config import DEFAULT_ENDPOINT, client_config
 from oxbow.bus.mailbox import Mailbox
 from oxbow.bus.query import JSON, Query
+from oxbow.bus.subscription import Audience, Declared, OnQuery, OnSample, Subscription
 from oxbow.errors import Busy, DeadlineExceeded, ErrorReply, Internal, OxbowError, Unavailable
 
-__all__ = [
-    "Audience",
-    "Declared",
-    "OnQuery",
-    "OnSample",
-    "Session",
-    "Subscription",
-    "error_of",
-]
+__all__ = ["Session", "error_of"]
 
 OPEN_ATTEMPT_S = 1.0
 LINK_LOSS_S = 0.1
 """How long after the loss of the link to the router a query may still leave over it, unnoticed."""
 
-OnSample = Callable[[str, bytes], None]
-"""Called with a sample's key and payload."""
-
-OnQuery = Callable[[str, dict[str, str], bytes], Iterable[tuple[str, bytes]]]
-"""Called with a query's key, parameters and payload; gives replies, each a key and a payload."""
-
 _log = logging.getLogger(__name__)
-
-
-class Declared(Protocol):
-    """Something declared on the bus, which can be taken back."""
-
-    def undeclare(self) -> Any: ...
-
-
-class Subscription:
-    """Something that receives until it is closed."""
-
-    def __init__(self, declared: Iterable[Declared], mailbox: Mailbox[Any]) -> None:
-        self._declared = tuple(declared)
-        self._mailbox = mailbox
-
-    def close(self) -> None:
-        """Receive nothing more, and return when all that had been received is dealt with."""
-        declared, self._declared = self._declared, ()
-        for each in declared:
-            each.undeclare()
-        self._mailbox.close()
-
-
-class Audience:
-    """Whether anyone listens to keys that match an expression."""
-
-    def __init__(self, publisher: zenoh.Publisher) -> None:
-        self._publisher = publisher
-
-    def __bool__(self) -> bool:
-        return bool(self._publisher.matching_status.matching)  # type: ignore[attr-defined]
 
 
 class Session:
@@ -88,6 +44,7 @@ class Session:
     def __init__(self, session: zenoh.Session, endpoint: str) -> None:
         self.endpoint = endpoint
         self._session = session
+        self._lock = threading.Lock()
         self._subscriptions: list[Subscription] = []
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
         self._asking: set[zenoh.CancellationToken] = set()
@@ -330,7 +287,8 @@ class Session:
             cancellation.cancel()
 
     def _keep(self, subscription: Subscription) -> Subscription:
-        self._subscriptions.append(subscription)
+        with self._lock:
+            self._subscriptions = [kept for kept in self._subscriptions if not kept.closed] + [subscription]
         return subscription
 
 
