@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from oxbow.local import LocalCall
+from oxbow.local import Handler, LocalCall
 from oxbow.recording import Show, discard
 
 __all__ = ["local_call"]
@@ -15,7 +15,7 @@ def local_call(show: Show = discard) -> LocalCall:
     import oxbow_decomposition.service  # noqa: PLC0415
     import oxbow_path.service  # noqa: PLC0415
 
-    handlers = {
+    handlers: dict[str, Handler] = {
         "contour": oxbow_contour.service.handle,
         "decomposition": oxbow_decomposition.service.handle,
         "path": oxbow_path.service.handle,

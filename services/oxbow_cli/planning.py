@@ -27,7 +27,7 @@ from oxbow_cli.stack import StackSettings, free_endpoint, running_stack
 
 __all__ = ["Job", "Planned", "Progress", "plan_embedded", "plan_here", "plan_on"]
 
-CONNECT_S = 5.0
+CONNECT_S = 3.0
 """How long a router and a mission service may take to answer; where they are up, they do in milliseconds."""
 
 Q = TypeVar("Q", bound=Message)

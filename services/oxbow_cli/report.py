@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["plan_document", "print_evaluation", "print_json", "print_plan", "print_status", "progress_bar"]
 
+MOST_DROPPED = 3
+
 Rows = Iterable[tuple[str, str]]
 
 
@@ -81,7 +83,7 @@ def _plan_table(site: str, plan: PlanRecord) -> Table:
         *_quality(certificate.cover_radius_m, certificate.least_radius_m, certificate.q, certificate.p95_ratio),
         ("conforms", _conformance(certificate.is_simple, certificate.outside_m, certificate.unsafe_m)),
     ]
-    rows += [("dropped", f"{part.area_m2:.0f} m2 at {_place(part.place)}: {part.reason}") for part in plan.dropped]
+    rows += [("dropped", text) for text in _dropped(plan)]
     rows += [("warning", warning) for warning in plan.warnings]
     return _table(f"Plan of {site}", rows)
 
@@ -151,6 +153,15 @@ def _quality(radius_m: tuple[float, float], least_m: float, q: float, p95_ratio:
 def _conformance(is_simple: bool, outside_m: float, unsafe_m: float) -> str:
     simple = "never crosses itself" if is_simple else "CROSSES ITSELF"
     return f"{simple}; {outside_m:.2f} m outside, {unsafe_m:.2f} m within Safety"
+
+
+def _dropped(plan: PlanRecord) -> Iterator[str]:
+    """The largest parts of the water that the plan leaves out; the file lists them all."""
+    parts = sorted(plan.dropped, key=lambda part: -part.area_m2)
+    for part in parts[:MOST_DROPPED]:
+        yield f"{part.area_m2:.0f} m2 at {_place(part.place)}: {part.reason}"
+    if rest := parts[MOST_DROPPED:]:
+        yield f"{sum(part.area_m2 for part in rest):.0f} m2 in {len(rest)} smaller parts"
 
 
 def _share(plan: PlanRecord) -> str:
