@@ -14,7 +14,9 @@ __all__ = ["main"]
 
 def main() -> None:
     """Run the command; ends the process with its exit status."""
-    signal.signal(signal.SIGTERM, _terminate)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup leaves it
+            signal.signal(number, _terminate)
     try:
         app(prog_name="oxbow")
     except KeyboardInterrupt:

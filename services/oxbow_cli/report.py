@@ -79,10 +79,15 @@ def _plan_table(site: str, plan: PlanRecord) -> Table:
         ("length", f"{_length(plan.length_m)} of {_length(plan.max_length_m)} ({_share(plan)})"),
         ("duration", _duration(plan.duration_s)),
         ("waypoints", f"{certificate.waypoints}"),
-        ("water covered", f"{certificate.judged_area:.1%} of {certificate.free_area_m2 / 1e6:.3f} km2"),
+        (
+            "water",
+            f"{certificate.free_area_m2 / 1e6:.3f} km2, {certificate.judged_area:.1%} in parts that it enters",
+        ),
         *_quality(certificate.cover_radius_m, certificate.least_radius_m, certificate.q, certificate.p95_ratio),
         ("conforms", _conformance(certificate.is_simple, certificate.outside_m, certificate.unsafe_m)),
     ]
+    if plan.mission_id is not None:
+        rows.insert(0, ("mission", f"{plan.mission_id}, revision {plan.revision}"))
     rows += [("dropped", text) for text in _dropped(plan)]
     rows += [("warning", warning) for warning in plan.warnings]
     return _table(f"Plan of {site}", rows)

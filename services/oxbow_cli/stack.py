@@ -21,6 +21,7 @@ __all__ = ["SERVICES", "StackSettings", "free_endpoint", "running_stack"]
 START_S = 30.0
 """How long a stack may take to come up, on a machine that is busy."""
 
+_ATTEMPT_S = 1.0
 _LOOK_S = 0.02
 _log = logging.getLogger(__name__)
 _STAGES = tuple(endpoint.stage for endpoint in STAGES)
@@ -75,8 +76,9 @@ def running_stack(settings: StackSettings, output: int | None = None) -> Iterato
     """
     with Supervisor(output) as supervisor:
         instances = _start(supervisor, settings)
-        with Bus.connect(settings.endpoint, timeout_s=START_S) as bus:
-            _wait_ready(bus, instances, supervisor)
+        give_up = time.monotonic() + START_S
+        with _connected(settings.endpoint, supervisor, give_up) as bus:
+            _wait_ready(bus, instances, supervisor, give_up)
         supervisor.keep_alive()
         yield
 
@@ -98,20 +100,33 @@ def _start(supervisor: Supervisor, settings: StackSettings) -> list[tuple[str, s
     return started
 
 
-def _wait_ready(bus: Bus, instances: Iterable[tuple[str, str]], supervisor: Supervisor) -> None:
+def _connected(endpoint: str, supervisor: Supervisor, give_up: float) -> Bus:
+    while True:
+        _require_alive(supervisor)
+        try:
+            return Bus.connect(endpoint, timeout_s=_ATTEMPT_S)
+        except Unavailable:
+            if time.monotonic() > give_up:
+                raise
+
+
+def _wait_ready(bus: Bus, instances: Iterable[tuple[str, str]], supervisor: Supervisor, give_up: float) -> None:
     """Wait for every process by its own name: another stack's would not do."""
-    give_up = time.monotonic() + START_S
     while missing := [service for service, instance in instances if instance not in bus.instances(service)]:
-        ended = supervisor.ended()
-        if missing == ["recorder"] and ended:
+        _require_alive(supervisor)
+        if missing == ["recorder"] and supervisor.ended():
             _log.warning("the recorder does not start; planning goes on without recordings")
             return
-        for name, status in ended.items():
-            if not name.startswith("recorder"):
-                raise Unavailable(f"ended with status {status} before it was ready", where=name)
         if time.monotonic() > give_up:
             raise Unavailable(f"no live {', '.join(missing)} after {START_S:g} s", where=bus.endpoint)
         time.sleep(_LOOK_S)
+
+
+def _require_alive(supervisor: Supervisor) -> None:
+    """Raise `Unavailable` where a process has ended that planning needs."""
+    for name, status in supervisor.ended().items():
+        if name != "recorder-1":
+            raise Unavailable(f"ended with status {status} before it was ready", where=name)
 
 
 def free_endpoint() -> str:
