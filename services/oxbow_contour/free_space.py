@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from shapely import Polygon
+from shapely import Polygon, STRtree
 
 from oxbow.errors import Infeasible, Internal
 from oxbow_contour.erosion import erode
+from oxbow_contour.rings import GeometryArray
 from oxbow_contour.simplification import Simplified, simplify
 from oxbow_contour.verification import inscribed_radius_m, is_safe, rounded_down
 
@@ -26,6 +27,9 @@ it would take many seconds.
 
 COARSEST, FINEST = 1 / 20, 1 / 2000
 """Bounds, in spacings, on tolerances that are made coarser or finer; what would be finer still is exact."""
+
+SLACK = 1 / 4
+"""How far, in tolerances, eroded contours are simplified once more: their round corners are many short edges."""
 
 ROUNDING = 1e-9
 """Of coordinates, relative."""
@@ -48,11 +52,22 @@ def true_water(outline: Polygon, zones: Sequence[Polygon]) -> tuple[Polygon, ...
     Infeasible
         The zones cover the whole outline.
     """
-    water = outline.difference(shapely.union_all(list(zones))) if zones else outline
+    land = shapely.get_parts(shapely.union_all(list(zones)))
+    if _are_islands(land, outline):
+        return (Polygon(outline.exterior, [island.exterior for island in land]),)
+    water = outline.difference(shapely.multipolygons(land))
     parts = tuple(part for part in shapely.get_parts(water) if isinstance(part, Polygon) and part.area > 0)
     if not parts:
         raise Infeasible("cover the whole outline and leave no water", where="ForbiddenZones")
     return parts
+
+
+def _are_islands(land: GeometryArray, outline: Polygon) -> bool:
+    """Whether polygons are holes of the outline as they stand: apart, in its interior and without holes."""
+    shapely.prepare(outline)
+    if not shapely.contains_properly(outline, land).all() or shapely.get_num_interior_rings(land).any():
+        return False
+    return len(STRtree(land).query(land, predicate="intersects").T) == len(land)
 
 
 def default_tolerance_m(safety_m: float, spacing_m: float) -> float:
@@ -88,7 +103,7 @@ def erode_water(
     asked_m = default_tolerance_m(safety_m, spacing_m) if tolerance_m is None else tolerance_m
     simplified = simplify(water, asked_m)
     while tolerance_m is None and _is_long(simplified, spacing_m):
-        simplified = simplify(water, 2 * simplified.tolerance_m)
+        simplified = simplify(water, 4 * simplified.tolerance_m)
     while True:
         parts = _shrunk(simplified, safety_m)
         if not parts:
@@ -118,9 +133,9 @@ def _shrunk(simplified: Simplified, safety_m: float) -> list[Polygon]:
     water as it is in the simplified. Each point of the true contours is within t of a simplified one, hence
     at least `safety_m` away from p. The new contours, in turn, are simplified within a slack eroded before.
     """
-    tolerance_m = simplified.tolerance_m
-    slack_m = tolerance_m / 10 + ROUNDING * simplified.extent_m
-    parts = erode(simplified.parts, safety_m + tolerance_m + 2 * slack_m, excess_m=tolerance_m)
+    rounding_m = ROUNDING * simplified.extent_m
+    slack_m = SLACK * simplified.tolerance_m + rounding_m
+    parts = erode(simplified.parts, safety_m + simplified.tolerance_m + slack_m + rounding_m)
     return [part for part in shapely.simplify(parts, slack_m) if part.area > 0]
 
 
@@ -132,8 +147,8 @@ def _closes_arms(simplified: Simplified, free: Polygon, safety_m: float, spacing
     """
     if simplified.tolerance_m == 0 or simplified.points_out > MANY_POINTS:
         return False
-    least_m = safety_m - 2 * simplified.tolerance_m
-    outer = erode(simplified.parts, least_m, simplified.tolerance_m) if least_m > 0 else simplified.parts
+    least_m = safety_m - simplified.tolerance_m
+    outer = erode(simplified.parts, least_m) if least_m > 0 else simplified.parts
     largest = max(outer, key=shapely.area)
     shapely.prepare(free)
     return not shapely.dwithin(free, shapely.points(shapely.get_coordinates(largest)), REACH * spacing_m).all()

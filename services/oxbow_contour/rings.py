@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import shapely
-from shapely import Polygon
+from shapely import MultiPolygon, Polygon
 
 from oxbow.contracts import FloatArray
 
@@ -16,9 +16,9 @@ __all__ = ["GeometryArray", "rings_of", "runs_of"]
 GeometryArray = np.ndarray[Any, np.dtype[np.object_]]
 
 
-def rings_of(polygons: Polygon | Sequence[Polygon] | GeometryArray) -> list[FloatArray]:
+def rings_of(polygons: Polygon | Sequence[Polygon | MultiPolygon] | GeometryArray) -> list[FloatArray]:
     """Closed arrays of shape (n, 2): of each polygon the exterior ring, then the interior ones."""
-    rings = shapely.get_rings(shapely.get_parts(np.asarray(polygons)))
+    rings = shapely.get_rings(shapely.get_parts(np.asarray(polygons, dtype=object)))
     return np.split(shapely.get_coordinates(rings), np.cumsum(shapely.get_num_coordinates(rings))[:-1])
 
 

@@ -7,7 +7,7 @@ from shapely import Polygon
 
 from oxbow.contracts import ContourRequest, DroppedPart, FreeSpace
 from oxbow.recording import Layer, LayerKind, Show
-from oxbow_contour.free_space import Eroded, default_tolerance_m, erode_water, true_water
+from oxbow_contour.free_space import Eroded, erode_water, true_water
 
 __all__ = ["handle"]
 
@@ -22,10 +22,7 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
     """
     show(Layer(stage="contour", name="raw", geometries=(request.outline, *request.zones)))
     water = true_water(request.outline, request.zones)
-    tolerance_m = request.tolerance_m
-    if tolerance_m is None:
-        tolerance_m = default_tolerance_m(request.safety_m, request.spacing_m)
-    eroded = erode_water(water, request.safety_m, request.spacing_m, tolerance_m)
+    eroded = erode_water(water, request.safety_m, request.spacing_m, request.tolerance_m)
     free, *others = eroded.parts
     home = next(part for part in water if part.contains(free.representative_point()))
     dropped = tuple(_dropped(part, home) for part in others)
@@ -42,10 +39,14 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
 
 def _dropped(part: Polygon, home: Polygon) -> DroppedPart:
     place = part.representative_point()
-    barrier = "at this safety distance" if home.contains(place) else "by water at all"
+    reason = (
+        "not connected to the largest part at this safety distance"
+        if home.contains(place)
+        else "in water that is not connected to the largest part's"
+    )
     return DroppedPart(
         area_m2=part.area,
-        reason=f"not connected to the largest part {barrier}",
+        reason=reason,
         place=(place.x, place.y),
         outline=part,
     )

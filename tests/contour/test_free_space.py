@@ -1,0 +1,312 @@
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import Point, Polygon, affinity, box
+
+from oxbow.codec import encode
+from oxbow.contracts import ContourRequest, FreeSpace
+from oxbow.errors import Infeasible
+from oxbow.recording import discard
+from oxbow.testing import nasty_polygons
+from oxbow_contour.free_space import default_tolerance_m, true_water
+from oxbow_contour.service import handle
+from oxbow_contour.verification import is_safe
+
+SQUARE = box(0, 0, 100, 100)
+
+
+def star(rng: np.random.Generator, centre, radius: float, count: int, roughness: float) -> Polygon:
+    angle = np.linspace(0, 2 * np.pi, count, endpoint=False)
+    radii = radius * (1 + roughness * rng.uniform(-1, 1, count))
+    return Polygon(np.asarray(centre) + radii[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
+
+
+def ragged_site(seed: int, count: int, roughness: float, zones: int) -> tuple[Polygon, tuple[Polygon, ...]]:
+    """A ragged outline and zones that may overlap, cross the outline or lie outside."""
+    rng = np.random.default_rng(seed)
+    outline = star(rng, (0, 0), 100, count, roughness)
+    return outline, tuple(
+        star(rng, rng.uniform(-110, 110, 2), rng.uniform(1, 30), 12, roughness) for _ in range(zones)
+    )
+
+
+sites = st.builds(
+    ragged_site,
+    st.integers(0, 2**32 - 1),
+    st.integers(6, 400),
+    st.sampled_from([0.0, 0.001, 0.05, 0.4, 0.9]),
+    st.integers(0, 10),
+)
+
+
+def free_space(outline: Polygon, zones=(), safety_m=0.0, spacing_m=10.0, tolerance_m=None) -> FreeSpace:
+    return handle(
+        ContourRequest(
+            outline=outline, zones=tuple(zones), safety_m=safety_m, spacing_m=spacing_m, tolerance_m=tolerance_m
+        ),
+        discard,
+    )
+
+
+def assert_safe(space: FreeSpace, outline: Polygon, zones, safety_m: float) -> None:
+    water = outline.difference(shapely.union_all(list(zones)))
+    assert space.free.is_valid
+    assert water.contains(space.free)
+    distance_m = space.free.boundary.distance(water.boundary)
+    assert distance_m > 0
+    assert distance_m >= safety_m * (1 - 1e-9)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    sites,
+    st.sampled_from([0.0, 0.01, 1.0, 5.0]),
+    st.sampled_from([1.0, 10.0, 100.0]),
+    st.sampled_from([None, 0.0, 0.1, 2.0, 30.0, 1e5]),
+)
+def test_free_space_is_inside_the_true_outline_less_the_safety_distance(site, safety_m, spacing_m, tolerance_m):
+    outline, zones = site
+    try:
+        space = free_space(outline, zones, safety_m, spacing_m, tolerance_m)
+    except Infeasible:
+        water = outline.difference(shapely.union_all(list(zones)))
+        assert water.buffer(-1.004 * safety_m - 1e-6).is_empty
+        return
+    assert_safe(space, outline, zones, safety_m)
+    assert space.water.contains(space.free)
+
+
+@settings(max_examples=60, deadline=None)
+@given(sites, st.sampled_from([0.5, 3.0]))
+def test_by_default_only_a_strip_along_the_shore_is_lost(site, safety_m):
+    outline, zones = site
+    spacing_m = 10.0
+    water = outline.difference(shapely.union_all(list(zones)))
+    exact = max(shapely.get_parts(water.buffer(-safety_m, quad_segs=32)), key=shapely.area, default=Polygon())
+    if exact.area < spacing_m**2:
+        return
+    free = free_space(outline, zones, safety_m, spacing_m).free
+    assert shapely.distance(free, shapely.points(shapely.get_coordinates(exact))).max() <= spacing_m / 4
+
+
+@pytest.mark.parametrize("name", nasty_polygons())
+@pytest.mark.parametrize("tolerance_m", [None, 0.0, 50.0])
+@pytest.mark.parametrize("safety_m", [0.0, 1.0])
+def test_nasty_sites(name, tolerance_m, safety_m):
+    water = nasty_polygons()[name]
+    outline, zones = Polygon(water.exterior), [Polygon(ring) for ring in water.interiors]
+    try:
+        space = free_space(outline, zones, safety_m, 20.0, tolerance_m)
+    except Infeasible:
+        assert shapely.buffer(water, -1.004 * safety_m).is_empty
+        return
+    assert_safe(space, outline, zones, safety_m)
+
+
+@settings(max_examples=40, deadline=None)
+@given(sites, st.floats(0, 360), st.sampled_from([0.01, 1.0, 1000.0]), st.sampled_from([0.0, 1e3, 1e6]))
+def test_moving_turning_and_scaling_a_site_does_the_same_to_its_free_space(site, degrees, scale, shift):
+    def moved(shape: Polygon) -> Polygon:
+        turned = affinity.rotate(shape, degrees, origin=(0, 0))
+        return affinity.translate(
+            affinity.scale(turned, scale, scale, origin=(0, 0)), shift * scale, -shift * scale
+        )
+
+    outline, zones = site
+    try:
+        here = free_space(outline, zones, 1.0, 10.0)
+    except Infeasible:
+        return
+    there = free_space(moved(outline), [moved(zone) for zone in zones], scale, 10.0 * scale)
+    # Rounding decides ties, so that a few vertices differ: by no more than the tolerance and a round corner's excess.
+    displaced_m = 2 * max(here.tolerance_m * scale, there.tolerance_m) + 0.003 * scale
+    assert moved(here.free).symmetric_difference(there.free).area <= displaced_m * there.free.length
+
+
+@settings(max_examples=20, deadline=None)
+@given(sites)
+def test_the_same_site_gives_the_same_bytes(site):
+    def reply() -> bytes:
+        try:
+            return encode(free_space(*site, 1.0, 5.0))
+        except Infeasible as error:
+            return error.message.encode()
+
+    assert reply() == reply()
+
+
+@settings(max_examples=60, deadline=None)
+@given(sites, st.sampled_from([20.0, 60.0, 1000.0]))
+def test_the_safety_distance_named_when_infeasible_leaves_water(site, safety_m):
+    outline, zones = site
+    try:
+        free_space(outline, zones, safety_m, 20.0)
+    except Infeasible as error:
+        if error.where != "Safety":
+            return
+        assert f"{safety_m:g}" in error.message
+        named_m = float(error.message.split("at most ")[1].split(" m")[0])
+        assert 0 < named_m < safety_m
+        assert free_space(outline, zones, named_m, 20.0).free.area > 0
+
+
+def test_the_safety_distance_named_is_nearly_the_largest():
+    with pytest.raises(Infeasible, match="at most 49") as raised:
+        free_space(SQUARE, safety_m=51.0)
+    assert raised.value.where == "Safety"
+
+
+@pytest.mark.parametrize(
+    "zones", [[box(-1, -1, 101, 101)], [SQUARE], [box(0, 0, 60, 100), box(50, 0, 100, 100)]], ids=str
+)
+def test_zones_that_cover_everything_are_infeasible(zones):
+    with pytest.raises(Infeasible, match="ForbiddenZones"):
+        free_space(SQUARE, zones)
+
+
+ISLAND = box(40, 40, 60, 60)
+
+
+@pytest.mark.parametrize(
+    ("zones", "area_m2", "islands"),
+    [
+        ([], 98**2, 0),
+        ([ISLAND], 98**2 - 22**2, 1),
+        ([ISLAND, ISLAND], 98**2 - 22**2, 1),
+        ([ISLAND, box(45, 45, 50, 50)], 98**2 - 22**2, 1),
+        ([ISLAND, box(50, 40, 80, 60)], 98**2 - 42 * 22, 1),
+        ([ISLAND, box(61, 40, 70, 60)], 98**2 - 32 * 22, 1),
+        ([ISLAND, box(200, 0, 300, 100)], 98**2 - 22**2, 1),
+        ([box(-10, -10, 110, 20)], 98 * 78, 0),
+        ([box(100, 0, 200, 100)], 98**2, 0),
+        ([box(0, 40, 20, 60)], 98**2 - 20 * 22, 0),
+        ([box(1.5, 40, 20, 60)], 98**2 - 20 * 22, 0),
+        ([Polygon([(30, 0), (50, 30), (70, 0)])], None, 0),
+        ([Polygon([(30, 50), (50, 100), (70, 50)])], None, 0),
+        ([box(-10, 40, 110, 60)], 98 * 38, 0),
+    ],
+    ids=[
+        "none",
+        "island",
+        "twice the same",
+        "nested",
+        "overlapping",
+        "nearly touching",
+        "one outside",
+        "across the border",
+        "along the border from outside",
+        "along the border from inside",
+        "near the border",
+        "an edge on the border",
+        "a point on the border",
+        "splitting",
+    ],
+)
+def test_zones(zones, area_m2, islands):
+    space = free_space(SQUARE, zones, safety_m=1.0, tolerance_m=0.0)
+    assert_safe(space, SQUARE, zones, 1.0)
+    assert len(space.free.interiors) == islands
+    if area_m2 is not None:
+        assert space.free.area == pytest.approx(area_m2, rel=2e-3)
+
+
+def test_islands_inside_the_outline_are_left_as_they_are():
+    (water,) = true_water(SQUARE, [ISLAND])
+    assert water.interiors[0].equals(ISLAND.exterior)
+    assert shapely.get_num_coordinates(water) == 10
+
+
+def test_islands_that_close_a_ring_corner_to_corner_cut_off_the_water_inside():
+    zones = [box(30, 30, 50, 50), box(50, 50, 70, 70), box(30, 70, 50, 90), box(10, 50, 30, 70)]
+    water = true_water(SQUARE, zones)
+    assert sorted(round(part.area) for part in water) == [400, 10_000 - 5 * 400]
+
+
+def test_parts_not_connected_are_dropped_and_listed():
+    straits = [box(0, 60, 47, 62), box(53, 60, 100, 62), box(0, 20, 100, 22)]
+    space = free_space(SQUARE, straits, safety_m=4.0, spacing_m=10.0)
+    assert_safe(space, SQUARE, straits, 4.0)
+    assert [part.reason for part in space.dropped] == [
+        "not connected to the largest part at this safety distance",
+        "in water that is not connected to the largest part's",
+    ]
+    assert [part.area_m2 for part in space.dropped] == [
+        pytest.approx(92 * 30, rel=0.02),
+        pytest.approx(92 * 12, rel=0.02),
+    ]
+    for part in space.dropped:
+        assert part.area_m2 == part.outline.area
+        assert part.outline.contains(Point(part.place))
+    assert any("2 parts" in warning for warning in space.warnings)
+
+
+def test_a_narrow_strait_is_not_closed_by_simplification():
+    # 2.2 m of strait at a safety distance of 1 m: the tolerance asked for alone would close it.
+    rough = [(x, 51.1 + 0.05 * (x % 2)) for x in range(40, 61)]
+    lake = Polygon(
+        [
+            (0, 0),
+            (40, 0),
+            (40, 48.9),
+            (60, 48.9),
+            (60, 0),
+            (100, 0),
+            (100, 100),
+            (60, 100),
+            *rough[::-1],
+            (40, 100),
+            (0, 100),
+        ]
+    )
+    space = free_space(lake, safety_m=1.0, spacing_m=5.0, tolerance_m=1.0)
+    assert not space.dropped
+    assert space.tolerance_m < 0.1
+    assert "closed an arm" in space.warnings[0]
+    assert_safe(space, lake, [], 1.0)
+
+
+def test_a_dead_end_arm_is_not_lost_to_simplification():
+    lake = shapely.union_all([SQUARE, box(100, 50, 300, 52.2)])
+    space = free_space(lake, safety_m=1.0, spacing_m=5.0, tolerance_m=0.5)
+    assert space.free.bounds[2] > 298
+
+
+def test_a_tolerance_larger_than_the_lake_is_reduced():
+    space = free_space(Point(0, 0).buffer(50), safety_m=1.0, spacing_m=5.0, tolerance_m=1e6)
+    assert space.tolerance_m < 1
+    assert space.free.area > 0.95 * np.pi * 49**2
+    assert space.warnings
+
+
+def test_without_safety_the_free_space_is_strictly_inside():
+    for tolerance_m in (None, 0.0):
+        space = free_space(SQUARE, [ISLAND], safety_m=0.0, tolerance_m=tolerance_m)
+        assert_safe(space, SQUARE, [ISLAND], 0.0)
+        assert space.free.area == pytest.approx(9600, rel=0.01)
+
+
+def test_far_from_the_origin():
+    outline = affinity.translate(star(np.random.default_rng(0), (0, 0), 100, 500, 0.3), 3e5, -3e5)
+    assert_safe(free_space(outline, safety_m=2.0), outline, [], 2.0)
+
+
+def test_default_tolerance_follows_safety_and_spacing():
+    assert default_tolerance_m(0.0, 100.0) == 0.5
+    assert default_tolerance_m(15.0, 100.0) == 0.75
+    assert default_tolerance_m(500.0, 100.0) == 1.0
+
+
+def test_a_million_points():
+    count = 1_000_000
+    angle = np.linspace(0, 2 * np.pi, count, endpoint=False)
+    waves = sum(np.sin(k * angle + k) / k for k in (3, 8, 21, 55, 144, 377))
+    radius = 10_000 + 1000 * waves + 0.5 * np.random.default_rng(0).uniform(-1, 1, count)
+    outline = Polygon(radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
+    island = Point(0, 0).buffer(700, quad_segs=1000)
+    space = free_space(outline, [island], safety_m=20.0, spacing_m=300.0)
+    assert space.compression > 100
+    assert len(space.free.interiors) == 1
+    assert is_safe(space.free, true_water(outline, [island]), 20.0)
+    assert space.free.area > 0.95 * (outline.area - island.area)
