@@ -34,7 +34,7 @@ def client_config(endpoint: str, timeout_s: float) -> zenoh.Config:
             "mode": "client",
             "connect/endpoints": [endpoint],
             "connect/timeout_ms": round(1000 * timeout_s),
-            "connect/retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2},
+            "connect/retry": {"period_init_ms": 50, "period_max_ms": 200, "period_increase_factor": 2},
         }
     )
 
