@@ -1,4 +1,4 @@
-"""From the true site to its free space: water, simplification, erosion, parts."""
+"""Free space: true water simplified, eroded, checked, and refined where that lost an arm."""
 
 from __future__ import annotations
 
@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from shapely import Polygon, STRtree
+from shapely import Polygon
 
 from oxbow.errors import Infeasible, Internal
 from oxbow_contour.erosion import erode
-from oxbow_contour.rings import GeometryArray
 from oxbow_contour.simplification import Simplified, simplify
 from oxbow_contour.verification import inscribed_radius_m, is_safe, rounded_down
 
-__all__ = ["Eroded", "default_tolerance_m", "erode_water", "true_water"]
+__all__ = ["Eroded", "default_tolerance_m", "erode_water"]
 
 REACH = 0.25
 """How far, in spacings, water that erosion may leave can be from the free space; farther, it is an arm lost."""
@@ -42,32 +41,6 @@ class Eroded:
     parts: tuple[Polygon, ...]
     simplified: Simplified
     warnings: tuple[str, ...] = ()
-
-
-def true_water(outline: Polygon, zones: Sequence[Polygon]) -> tuple[Polygon, ...]:
-    """The parts of the outline that no zone covers, not simplified.
-
-    Raises
-    ------
-    Infeasible
-        The zones cover the whole outline.
-    """
-    land = shapely.get_parts(shapely.union_all(list(zones)))
-    if _are_islands(land, outline):
-        return (Polygon(outline.exterior, [island.exterior for island in land]),)
-    water = outline.difference(shapely.multipolygons(land))
-    parts = tuple(part for part in shapely.get_parts(water) if isinstance(part, Polygon) and part.area > 0)
-    if not parts:
-        raise Infeasible("cover the whole outline and leave no water", where="ForbiddenZones")
-    return parts
-
-
-def _are_islands(land: GeometryArray, outline: Polygon) -> bool:
-    """Whether polygons are holes of the outline as they stand: apart, in its interior and without holes."""
-    shapely.prepare(outline)
-    if not shapely.contains_properly(outline, land).all() or shapely.get_num_interior_rings(land).any():
-        return False
-    return len(STRtree(land).query(land, predicate="intersects").T) == len(land)
 
 
 def default_tolerance_m(safety_m: float, spacing_m: float) -> float:
@@ -156,6 +129,10 @@ def _closes_arms(simplified: Simplified, free: Polygon, safety_m: float, spacing
 
 def _require_room(water: Sequence[Polygon], safety_m: float, *, is_certain: bool) -> None:
     """Raise `Infeasible` where no circle of that radius fits into the water, or it is certain already."""
+    if safety_m == 0:
+        if is_certain:
+            raise Infeasible("leaves no water wider than rounding errors", where="BoundingBox")
+        return
     precision_m = safety_m / 1000
     radius_m = inscribed_radius_m(water, precision_m)
     if is_certain or radius_m + precision_m < safety_m:

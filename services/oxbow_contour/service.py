@@ -7,7 +7,8 @@ from shapely import Polygon
 
 from oxbow.contracts import ContourRequest, DroppedPart, FreeSpace
 from oxbow.recording import Layer, LayerKind, Show
-from oxbow_contour.free_space import Eroded, erode_water, true_water
+from oxbow_contour.free_space import Eroded, erode_water
+from oxbow_contour.water import true_water
 
 __all__ = ["handle"]
 
@@ -25,6 +26,7 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
     eroded = erode_water(water, request.safety_m, request.spacing_m, request.tolerance_m)
     free, *others = eroded.parts
     home = next(part for part in water if part.contains(free.representative_point()))
+    shapely.prepare(home)
     dropped = tuple(_dropped(part, home) for part in others)
     _show_result(eroded, dropped, show)
     return FreeSpace(
@@ -44,19 +46,14 @@ def _dropped(part: Polygon, home: Polygon) -> DroppedPart:
         if home.contains(place)
         else "in water that is not connected to the largest part's"
     )
-    return DroppedPart(
-        area_m2=part.area,
-        reason=reason,
-        place=(place.x, place.y),
-        outline=part,
-    )
+    return DroppedPart(area_m2=part.area, reason=reason, place=(place.x, place.y), outline=part)
 
 
 def _summary(dropped: tuple[DroppedPart, ...]) -> tuple[str, ...]:
     if not dropped:
         return ()
-    area = sum(part.area_m2 for part in dropped)
-    return (f"{len(dropped)} parts of the free space, {area:.0f} m2 together, are not connected to the largest",)
+    area_m2 = sum(part.area_m2 for part in dropped)
+    return (f"dropped, for want of a connection to the largest part: {len(dropped)} of {area_m2:.0f} m2 together",)
 
 
 def _show_result(eroded: Eroded, dropped: tuple[DroppedPart, ...], show: Show) -> None:

@@ -10,9 +10,10 @@ from oxbow.contracts import ContourRequest, FreeSpace
 from oxbow.errors import Infeasible
 from oxbow.recording import discard
 from oxbow.testing import nasty_polygons
-from oxbow_contour.free_space import default_tolerance_m, true_water
+from oxbow_contour.free_space import default_tolerance_m
 from oxbow_contour.service import handle
 from oxbow_contour.verification import is_safe
+from oxbow_contour.water import true_water
 
 SQUARE = box(0, 0, 100, 100)
 
@@ -35,7 +36,7 @@ def ragged_site(seed: int, count: int, roughness: float, zones: int) -> tuple[Po
 sites = st.builds(
     ragged_site,
     st.integers(0, 2**32 - 1),
-    st.integers(6, 400),
+    st.integers(6, 250),
     st.sampled_from([0.0, 0.001, 0.05, 0.4, 0.9]),
     st.integers(0, 10),
 )
@@ -59,7 +60,7 @@ def assert_safe(space: FreeSpace, outline: Polygon, zones, safety_m: float) -> N
     assert distance_m >= safety_m * (1 - 1e-9)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     sites,
     st.sampled_from([0.0, 0.01, 1.0, 5.0]),
@@ -78,7 +79,7 @@ def test_free_space_is_inside_the_true_outline_less_the_safety_distance(site, sa
     assert space.water.contains(space.free)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(sites, st.sampled_from([0.5, 3.0]))
 def test_by_default_only_a_strip_along_the_shore_is_lost(site, safety_m):
     outline, zones = site
@@ -120,7 +121,7 @@ def test_moving_turning_and_scaling_a_site_does_the_same_to_its_free_space(site,
     except Infeasible:
         return
     there = free_space(moved(outline), [moved(zone) for zone in zones], scale, 10.0 * scale)
-    # Rounding decides ties, so that a few vertices differ: by no more than the tolerance and a round corner's excess.
+    # Rounding decides ties, so that a few vertices differ: by the tolerance and a round corner's excess at most.
     displaced_m = 2 * max(here.tolerance_m * scale, there.tolerance_m) + 0.003 * scale
     assert moved(here.free).symmetric_difference(there.free).area <= displaced_m * there.free.length
 
@@ -137,7 +138,7 @@ def test_the_same_site_gives_the_same_bytes(site):
     assert reply() == reply()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(sites, st.sampled_from([20.0, 60.0, 1000.0]))
 def test_the_safety_distance_named_when_infeasible_leaves_water(site, safety_m):
     outline, zones = site
@@ -239,7 +240,7 @@ def test_parts_not_connected_are_dropped_and_listed():
     for part in space.dropped:
         assert part.area_m2 == part.outline.area
         assert part.outline.contains(Point(part.place))
-    assert any("2 parts" in warning for warning in space.warnings)
+    assert any("2 of " in warning for warning in space.warnings)
 
 
 def test_a_narrow_strait_is_not_closed_by_simplification():
@@ -285,6 +286,11 @@ def test_without_safety_the_free_space_is_strictly_inside():
         space = free_space(SQUARE, [ISLAND], safety_m=0.0, tolerance_m=tolerance_m)
         assert_safe(space, SQUARE, [ISLAND], 0.0)
         assert space.free.area == pytest.approx(9600, rel=0.01)
+
+
+def test_water_thinner_than_rounding_is_infeasible():
+    with pytest.raises(Infeasible, match="rounding"):
+        free_space(affinity.translate(box(0, 0, 100, 1e-5), 0, 3e5), safety_m=0.0)
 
 
 def test_far_from_the_origin():
