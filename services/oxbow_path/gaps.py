@@ -11,7 +11,7 @@ from shapely import LineString, Point, Polygon
 
 from oxbow.contracts import FloatArray
 from oxbow_path.probe import Probe
-from oxbow_path.routes import Routes
+from oxbow_path.routes import Indices, Routes
 from oxbow_path.walk import Walk, band, grown, largest, simply_connected
 
 __all__ = ["branch_to", "reach_gaps"]
@@ -28,7 +28,7 @@ def reach_gaps(
     Inside it, where bands have merged, the gap is opened by a slit from the boundary.
     """
     for _ in range(ROUNDS):
-        distance = probe.distances([walk.ring])
+        distance = probe.distances(walk.ring)
         worst_first = np.argsort(-distance)
         gaps = probe.points[worst_first[: np.count_nonzero(distance > reach_m)]]
         if len(gaps) == 0:
@@ -63,10 +63,11 @@ def _branches(
     """A branch for each gap that no earlier branch of this round has come near."""
     index = cKDTree(gaps)
     reached = np.zeros(len(gaps), dtype=bool)
+    goals = routes.midpoints_in(region)
     for number, gap in enumerate(gaps):
         if reached[number]:
             continue
-        branch = branch_to(gap, region, routes, overlap_m)
+        branch = branch_to(gap, region, routes, goals, overlap_m)
         yield branch
         steps = shapely.get_coordinates(shapely.segmentize(branch, apart_m / 4)) if branch.length else gap[None]
         for near in index.query_ball_point(steps, apart_m):
@@ -74,15 +75,12 @@ def _branches(
         reached[number] = True
 
 
-def branch_to(gap: FloatArray, region: Polygon, routes: Routes, overlap_m: float) -> LineString:
+def branch_to(gap: FloatArray, region: Polygon, routes: Routes, goals: Indices, overlap_m: float) -> LineString:
     """From a gap straight to the region where the water allows, else along the middle of the water."""
     straight = shapely.shortest_line(Point(gap), region)
     if shapely.covers(routes.water, straight):
         return _lengthened(straight, overlap_m)
-    shapely.prepare(region)
-    route = routes.route(
-        (float(gap[0]), float(gap[1])), lambda xy: shapely.contains_xy(region, xy[:, 0], xy[:, 1])
-    )
+    route = routes.route(gap, goals)
     return straight if route is None else route
 
 

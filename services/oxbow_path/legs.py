@@ -57,14 +57,14 @@ def access(place: Place, free: Polygon, water: Routes, where: str) -> Access:
     straight = shapely.shortest_line(point, free)
     if water.water.covers(straight) or not water.water.covers(point):
         return Access(shapely.get_coordinates(straight))
-    route = water.route(place, lambda xy: shapely.contains_xy(free, xy[:, 0], xy[:, 1]))
+    route = water.route(place, water.midpoints_in(free))
     if route is None:
         raise Infeasible(f"no way through the water leads from {place} to the free space", where)
     outside = shapely.get_parts(route.difference(free))[0]
     return Access(shapely.get_coordinates(outside))
 
 
-def joined(region: Polygon, launch: Access, recovery: Access, opening_m: float) -> LineString:
+def joined(region: Polygon, launch: Access, recovery: Access, *, opening_m: float, detail_m: float) -> LineString:
     """The path: leg, ring, leg.
 
     Parameters
@@ -75,19 +75,23 @@ def joined(region: Polygon, launch: Access, recovery: Access, opening_m: float) 
         How the two points are reached.
     opening_m
         Width of the ring's opening; halved until the legs fit through without a crossing.
+    detail_m
+        How finely the way through the region follows its middle.
 
     Raises
     ------
     Internal
         No opening gives a simple path: a fault of the construction.
     """
-    for path in _candidates(region, launch, recovery, opening_m):
+    for path in _candidates(region, launch, recovery, opening_m, detail_m):
         if path.is_simple:
             return path
     raise Internal(f"the legs from {launch.place} and to {recovery.place} do not fit the ring", "legs")
 
 
-def _candidates(region: Polygon, launch: Access, recovery: Access, opening_m: float) -> Iterator[LineString]:
+def _candidates(
+    region: Polygon, launch: Access, recovery: Access, opening_m: float, detail_m: float
+) -> Iterator[LineString]:
     opening_m = min(opening_m, region.exterior.length / 8)
     for _ in range(HALVINGS):
         if launch.place == recovery.place:
@@ -95,9 +99,9 @@ def _candidates(region: Polygon, launch: Access, recovery: Access, opening_m: fl
         elif shapely.dwithin(recovery.entry, region.exterior, opening_m / 8) and not shapely.dwithin(
             launch.entry, region.exterior, opening_m / 8
         ):
-            yield from (path.reverse() for path in _open(region, recovery, launch, opening_m))
+            yield from (path.reverse() for path in _open(region, recovery, launch, opening_m, detail_m))
         else:
-            yield from _open(region, launch, recovery, opening_m)
+            yield from _open(region, launch, recovery, opening_m, detail_m)
         opening_m /= 2
 
 
@@ -123,7 +127,9 @@ def _beside(leg: FloatArray, offset_m: float, side: float) -> FloatArray:
     return np.asarray((leg + side * offset_m * share[:, None] * normal)[:-1])
 
 
-def _open(region: Polygon, launch: Access, recovery: Access, opening_m: float) -> Iterator[LineString]:
+def _open(
+    region: Polygon, launch: Access, recovery: Access, opening_m: float, detail_m: float
+) -> Iterator[LineString]:
     """Round the ring, and through the region to the recovery point.
 
     Where the recovery point lies inside the region, the whole ring is travelled first. Otherwise the way
@@ -132,15 +138,16 @@ def _open(region: Polygon, launch: Access, recovery: Access, opening_m: float) -
     line = LineString(region.exterior)
     start, end = line.project(launch.entry), line.project(recovery.entry)
     out = np.vstack([launch.leg, shapely.get_coordinates(line.interpolate(start))])
-    through = Routes(_without(region, out, opening_m / 16), opening_m * 4)
+    through = Routes(_without(region, out, opening_m / 16), detail_m)
     if not shapely.dwithin(recovery.entry, line, opening_m / 8):
         ring = _part(line, start, start - opening_m)
         way = through.between(ring[-1], recovery.leg[-1])
         yield _chain(out, ring, way, recovery.leg[::-1])
         return
-    near, far = _part(line, start, end), _part(line, end + opening_m, start - opening_m)
+    near = _part(line, start, end - opening_m / 2)
+    far = _part(line, end + opening_m / 2, start - opening_m)
     way = through.between(near[-1], far[-1])
-    yield _chain(out, near, way, far[::-1], recovery.leg[::-1])
+    yield _chain(out, near, way, far[::-1], recovery.leg[-2::-1])
 
 
 def _without(region: Polygon, leg: FloatArray, half_width_m: float) -> Polygon:

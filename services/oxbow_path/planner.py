@@ -32,7 +32,7 @@ FIRST_SPACING = 1.15
 
 REACHES = (1.5, 1.3, 1.8)
 PHASES = (0.25, 0.75)
-PROBE_PITCH = 0.5
+PROBE_PITCH = 0.35
 """Pitch of the probe grid, in nominal spacings."""
 
 
@@ -81,7 +81,7 @@ def _score(trial: Trial, waters: Waters, budget: Budget) -> float:
 
     A path much shorter than allowed is charged for what it leaves unused.
     """
-    distance = waters.probe.distances([trial.path])
+    distance = waters.probe.distances(trial.path)
     unused = max(0.0, budget.enough_m / trial.length_m - 1.0)
     return float(distance.max() + np.quantile(distance, 0.95)) * (1.0 + unused)
 

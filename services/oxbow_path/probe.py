@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 from scipy.spatial import cKDTree
 from shapely import Polygon
@@ -14,7 +15,9 @@ from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray
 
-__all__ = ["Probe"]
+__all__ = ["Probe", "covered"]
+
+Indices = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -42,16 +45,28 @@ class Probe:
     def _tree(self) -> shapely.STRtree:
         return shapely.STRtree(np.asarray(shapely.points(self.points)))
 
-    def within(self, area: Polygon) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    def within(self, area: Polygon) -> Indices:
         """Indices of the points inside an area."""
         return self._tree.query(area, predicate="contains")
 
-    def distances(self, lines: Iterable[BaseGeometry], points: FloatArray | None = None) -> FloatArray:
-        """Distance of every probe point (or of `points`) to the nearest of some lines, shape (n,)."""
-        steps = shapely.get_coordinates(shapely.segmentize(np.asarray(list(lines)), self.pitch_m / 4))
-        distance, _ = cKDTree(steps).query(self.points if points is None else points)
+    def steps(self, lines: Iterable[BaseGeometry]) -> tuple[FloatArray, Indices]:
+        """Points along lines, no farther apart than a quarter of the pitch, and the number of the line of each."""
+        return shapely.get_coordinates(
+            shapely.segmentize(np.asarray(list(lines)), self.pitch_m / 4), return_index=True
+        )
+
+    def distances(self, line: BaseGeometry) -> FloatArray:
+        """Distance of every probe point to a line, shape (n,)."""
+        steps, _ = self.steps([line])
+        distance, _ = cKDTree(steps).query(self.points)
         return np.asarray(distance)
 
-    def farthest(self, points: FloatArray, lines: Iterable[BaseGeometry]) -> float:
-        """The largest distance from `points` to the nearest of some lines; 0 where there are none."""
-        return float(self.distances(lines, points).max()) if len(points) else 0.0
+
+def covered(points: FloatArray, steps: FloatArray, reach_m: float) -> bool:
+    """Whether every point has a step within reach."""
+    if len(points) == 0:
+        return True
+    if len(steps) == 0:
+        return False
+    distance, _ = cKDTree(steps).query(points, distance_upper_bound=reach_m)
+    return bool(np.isfinite(distance).all())

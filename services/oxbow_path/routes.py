@@ -7,7 +7,6 @@ shore, and runs along the middle of narrow arms.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -20,7 +19,7 @@ from shapely import LineString, Point, Polygon
 from oxbow.contracts import FloatArray, Place
 from oxbow.errors import Internal
 
-__all__ = ["Routes"]
+__all__ = ["Indices", "Routes"]
 
 Indices = npt.NDArray[np.intp]
 
@@ -44,17 +43,13 @@ class Routes:
     def _mesh(self) -> _Mesh:
         return _Mesh(self.water, self.detail_m)
 
-    def route(self, start: Place, arrived: Callable[[FloatArray], npt.NDArray[np.bool_]]) -> LineString | None:
-        """The shortest route over midpoints from `start` to one for which `arrived` holds; None if none does.
+    def midpoints_in(self, area: Polygon) -> Indices:
+        """The midpoints inside an area: goals of a route to it."""
+        shapely.prepare(area)
+        return np.flatnonzero(shapely.contains_xy(area, self._mesh.midpoints))
 
-        Parameters
-        ----------
-        start
-            A point of the water.
-        arrived
-            Given all midpoints, shape (n, 2), tells which of them are goals.
-        """
-        goals = np.flatnonzero(arrived(self._mesh.midpoints))
+    def route(self, start: Place | FloatArray, goals: Indices) -> LineString | None:
+        """The shortest route over midpoints from a point of the water to a goal; None if none leads there."""
         way = self._way(start, goals)
         return None if way is None else LineString(np.vstack([start, way]))
 

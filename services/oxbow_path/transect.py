@@ -114,7 +114,7 @@ def try_pattern(waters: Waters, pattern: Pattern) -> Trial:
     )
     region = _straightened(walk.region, waters, STRAIGHTENING * pattern.spacing_m)
     region = _accessible(region, waters, pattern.half_width_m)
-    path = joined(region, waters.launch, waters.recovery, cut_m)
+    path = joined(region, waters.launch, waters.recovery, opening_m=cut_m, detail_m=pattern.half_width_m)
     return Trial(pattern, circuit, Walk(region, walk.cuts, walk.enclosed), path)
 
 
@@ -138,7 +138,9 @@ def _accessible(region: Polygon, waters: Waters, half_width_m: float) -> Polygon
     """The region grown to the launch and recovery points' entries; holes that this makes are enclosed."""
     for entry in (waters.launch.entry, waters.recovery.entry):
         if not _touches(region, entry):
-            branch = branch_to(shapely.get_coordinates(entry)[0], region, waters.routes, half_width_m)
+            goals = waters.routes.midpoints_in(region)
+            place = shapely.get_coordinates(entry)[0]
+            branch = branch_to(place, region, waters.routes, goals, half_width_m)
             region = Polygon(grown(region, band([branch], half_width_m), waters.free).exterior)
     return region
 

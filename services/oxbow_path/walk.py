@@ -11,12 +11,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 from shapely import LinearRing, LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.contracts import FloatArray
 from oxbow_path.circuit import Circuit
-from oxbow_path.probe import Probe
+from oxbow_path.probe import Probe, covered
 
 __all__ = ["Walk", "band", "dilated", "grown", "largest", "simply_connected"]
 
@@ -86,16 +88,25 @@ def simply_connected(region: Polygon, probe: Probe, *, cut_width_m: float, reach
 
 def _enclose(region: Polygon, probe: Probe, reach_m: float) -> tuple[list[LinearRing], list[Polygon]]:
     """Split the holes into those to keep and those that the rest of the boundary covers well enough."""
-    kept = dict(enumerate(region.interiors))
-    enclosed = []
-    for index in sorted(kept, key=lambda i: Polygon(kept[i]).area):
-        hole = Polygon(kept[index])
-        served = probe.points[probe.within(hole.buffer(reach_m))]
-        rest = [region.exterior, *(ring for i, ring in kept.items() if i != index)]
-        if probe.farthest(served, rest) <= reach_m:
-            del kept[index]
-            enclosed.append(hole)
-    return list(kept.values()), enclosed
+    rings = [region.exterior, *region.interiors]
+    steps, owner = probe.steps(rings)
+    kept = np.ones(len(rings), dtype=bool)
+    holes = [Polygon(ring) for ring in rings]
+    for index in sorted(range(1, len(rings)), key=lambda i: holes[i].area):
+        served = probe.points[probe.within(holes[index].buffer(reach_m))]
+        rest = _near(steps, holes[index], 2 * reach_m) & (owner != index) & kept[owner]
+        kept[index] = not covered(served, steps[rest], reach_m)
+    return (
+        [ring for ring, keep in zip(rings[1:], kept[1:], strict=True) if keep],
+        [hole for hole, keep in zip(holes[1:], kept[1:], strict=True) if not keep],
+    )
+
+
+def _near(points: FloatArray, area: Polygon, margin_m: float) -> npt.NDArray[np.bool_]:
+    """Which points lie in the bounding box of an area, widened by a margin."""
+    x0, y0, x1, y1 = area.bounds
+    low, high = np.array([x0, y0]) - margin_m, np.array([x1, y1]) + margin_m
+    return np.asarray(((points >= low) & (points <= high)).all(axis=1))
 
 
 def _cuts(region: Polygon) -> list[LineString]:
