@@ -22,6 +22,9 @@ from oxbow_path.walk import largest
 
 __all__ = ["Access", "access", "joined"]
 
+ROUNDING_M = 1e-6
+"""Places nearer to each other than this are one."""
+
 HALVINGS = 12
 """How often the opening of the ring may be halved until the legs fit."""
 
@@ -137,25 +140,22 @@ def _open(
     """
     line = LineString(region.exterior)
     start, end = line.project(launch.entry), line.project(recovery.entry)
-    out = np.vstack([launch.leg, shapely.get_coordinates(line.interpolate(start))])
-    through = Routes(_without(region, out, opening_m / 16), detail_m)
+    inner_leg = shapely.shortest_line(launch.entry, line)
+    through = Routes(_without(region, inner_leg, opening_m / 16), detail_m)
     if not shapely.dwithin(recovery.entry, line, opening_m / 8):
         ring = _part(line, start, start - opening_m)
         way = through.between(ring[-1], recovery.leg[-1])
-        yield _chain(out, ring, way, recovery.leg[::-1])
+        yield _chain(launch.leg[:-1], ring, way, recovery.leg[::-1])
         return
     near = _part(line, start, end - opening_m / 2)
     far = _part(line, end + opening_m / 2, start - opening_m)
     way = through.between(near[-1], far[-1])
-    yield _chain(out, near, way, far[::-1], recovery.leg[-2::-1])
+    yield _chain(launch.leg[:-1], near, way, far[::-1], recovery.leg[-2::-1])
 
 
-def _without(region: Polygon, leg: FloatArray, half_width_m: float) -> Polygon:
-    """The region less the leg, should it run inside."""
-    line = LineString(leg)
-    if line.length == 0 or not region.intersects(line):
-        return region
-    return largest(region.difference(line.buffer(half_width_m)))
+def _without(region: Polygon, line: LineString, half_width_m: float) -> Polygon:
+    """The region less a line that runs inside it."""
+    return largest(region.difference(line.buffer(half_width_m))) if line.length > ROUNDING_M else region
 
 
 def _part(ring: LineString, start_m: float, end_m: float) -> FloatArray:
@@ -168,7 +168,10 @@ def _part(ring: LineString, start_m: float, end_m: float) -> FloatArray:
 
 
 def _chain(*parts: FloatArray) -> LineString:
-    """One line through all parts, without repeated points."""
+    """One line through all parts, its ends exact, without points that rounding alone keeps apart."""
     points = np.vstack(parts)
-    keep = np.concatenate([[True], np.any(np.diff(points, axis=0) != 0, axis=1)])
+    apart = np.hypot(*np.diff(points, axis=0).T) > ROUNDING_M
+    keep = np.concatenate([[True], apart[:-1], [True]])
+    if not apart[-1]:
+        keep[np.flatnonzero(keep[1:-1])[-1] + 1] = False
     return LineString(points[keep])
