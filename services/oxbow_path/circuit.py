@@ -96,6 +96,8 @@ def _spanning_tree(cells: Sequence[Cell], transects: Sequence[Transect]) -> nx.G
     leaves = [node for node in tree if node[0] == "slot" and tree.degree(node) <= 1]
     while leaves:
         leaf = leaves.pop()
+        if leaf not in tree:
+            continue
         neighbours = list(tree.neighbors(leaf))
         tree.remove_node(leaf)
         leaves.extend(n for n in neighbours if n[0] == "slot" and tree.degree(n) <= 1)
@@ -158,7 +160,7 @@ def _link(cell: Cell, near: Port, far: Port, inset_m: float) -> LineString:
     """Join two ports of a cell: straight and along the floor where that stays inside, else between the shores."""
     if near.u == far.u:
         return _detour(cell, near, far, inset_m)
-    us, floor, ceiling = _profile(cell, near.u, far.u)
+    _, floor, ceiling = _profile(cell, near.u, far.u)
     low = max(float(floor.max()), near.low, far.low)
     high = min(float(ceiling.min()), near.high, far.high)
     if high > low:

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from shapely import LinearRing, LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
 from oxbow.contracts import FloatArray, Place
 from oxbow.errors import Infeasible, Internal
-from oxbow_path.routes import Routes
+from oxbow_path.routes import Routes, taut
 from oxbow_path.walk import largest
 
 __all__ = ["Access", "access", "joined"]
@@ -33,10 +34,11 @@ HALVINGS = 12
 class Access:
     """How a launch or recovery point is reached: `leg` runs from it to the free space, through the water.
 
-    A point inside the free space has a leg of no length.
+    A point inside the free space has a leg of no length; that of a point ashore runs straight over land first.
     """
 
     leg: FloatArray
+    ashore: bool = False
 
     @property
     def place(self) -> Place:
@@ -48,26 +50,48 @@ class Access:
         """Where the leg meets the free space."""
         return Point(self.leg[-1])
 
+    @property
+    def line(self) -> LineString:
+        """The leg as a line."""
+        return LineString(self.leg)
 
-def access(place: Place, free: Polygon, water: Routes, where: str) -> Access:
-    """The shortest leg from a launch or recovery point to the free space.
 
-    Straight where the water allows, or where the point lies ashore; else round the shore.
+def access(place: Place, free: Polygon, water: Routes, *, clearance_m: float, where: str) -> Access:
+    """The leg from a launch or recovery point to the free space.
+
+    The shortest line, where the water allows it or the point lies ashore. Else along the middle of the water,
+    pulled tight wherever that keeps `clearance_m` from the shore.
+
+    Raises
+    ------
+    Infeasible
+        The point's water is not connected to the free space.
     """
     point = Point(place)
     if free.covers(point):
         return Access(np.array([place, place]))
     straight = shapely.shortest_line(point, free)
-    if water.water.covers(straight) or not water.water.covers(point):
+    if not water.water.covers(point):
+        return Access(shapely.get_coordinates(straight), ashore=True)
+    if water.water.covers(straight):
         return Access(shapely.get_coordinates(straight))
     route = water.route(place, water.midpoints_in(free))
     if route is None:
         raise Infeasible(f"no way through the water leads from {place} to the free space", where)
-    outside = shapely.get_parts(route.difference(free))[0]
+    roomy = water.water.buffer(-clearance_m).union(point.buffer(4 * clearance_m).intersection(water.water))
+    outside = shapely.get_parts(taut(route, roomy).difference(free))[0]
     return Access(shapely.get_coordinates(outside))
 
 
-def joined(region: Polygon, launch: Access, recovery: Access, *, opening_m: float, detail_m: float) -> LineString:
+def joined(
+    region: Polygon,
+    launch: Access,
+    recovery: Access,
+    waters: tuple[Polygon, Polygon],
+    *,
+    opening_m: float,
+    detail_m: float,
+) -> LineString:
     """The path: leg, ring, leg.
 
     Parameters
@@ -76,8 +100,11 @@ def joined(region: Polygon, launch: Access, recovery: Access, *, opening_m: floa
         The walk's region; both entries lie in it or on its boundary.
     launch, recovery
         How the two points are reached.
+    waters
+        The free space, which only the legs may leave, and the water, which only legs from ashore may leave.
     opening_m
-        Width of the ring's opening; halved until the legs fit through without a crossing.
+        Width of the ring's opening at most; it is a tenth of the shorter leg, and halved until the legs fit
+        through without a crossing.
     detail_m
         How finely the way through the region follows its middle.
 
@@ -86,26 +113,37 @@ def joined(region: Polygon, launch: Access, recovery: Access, *, opening_m: floa
     Internal
         No opening gives a simple path: a fault of the construction.
     """
-    for path in _candidates(region, launch, recovery, opening_m, detail_m):
-        if path.is_simple:
-            return path
+    lengths = [leg.line.length / 10 for leg in (launch, recovery) if leg.line.length > ROUNDING_M]
+    opening_m = min([opening_m, region.exterior.length / 8, *lengths])
+    free, water = (polygon.buffer(ROUNDING_M) for polygon in waters)
+    for _ in range(HALVINGS):
+        allowed = [_corridor(leg, water, opening_m) for leg in (launch, recovery)]
+        for path in _candidates(region, launch, recovery, opening_m, detail_m):
+            legs = path.difference(free)
+            if path.is_simple and legs.difference(shapely.union_all(allowed)).length < ROUNDING_M:
+                return path
+        opening_m /= 2
     raise Internal(f"the legs from {launch.place} and to {recovery.place} do not fit the ring", "legs")
+
+
+def _corridor(leg: Access, water: BaseGeometry, width_m: float) -> BaseGeometry:
+    """Where a leg and its way back may run."""
+    beside = leg.line.buffer(width_m)
+    return beside if leg.ashore else beside.intersection(water)
 
 
 def _candidates(
     region: Polygon, launch: Access, recovery: Access, opening_m: float, detail_m: float
 ) -> Iterator[LineString]:
-    opening_m = min(opening_m, region.exterior.length / 8)
-    for _ in range(HALVINGS):
-        if launch.place == recovery.place:
-            yield from _closed(region.exterior, launch, opening_m)
-        elif shapely.dwithin(recovery.entry, region.exterior, opening_m / 8) and not shapely.dwithin(
-            launch.entry, region.exterior, opening_m / 8
-        ):
-            yield from (path.reverse() for path in _open(region, recovery, launch, opening_m, detail_m))
-        else:
-            yield from _open(region, launch, recovery, opening_m, detail_m)
-        opening_m /= 2
+    if launch.place == recovery.place:
+        return _closed(region.exterior, launch, opening_m)
+    if _on(region.exterior, recovery) and not _on(region.exterior, launch):
+        return (path.reverse() for path in _open(region, recovery, launch, opening_m, detail_m))
+    return _open(region, launch, recovery, opening_m, detail_m)
+
+
+def _on(ring: LinearRing, access: Access) -> bool:
+    return bool(shapely.dwithin(access.entry, ring, ROUNDING_M))
 
 
 def _closed(ring: LinearRing, launch: Access, opening_m: float) -> Iterator[LineString]:
@@ -142,7 +180,7 @@ def _open(
     start, end = line.project(launch.entry), line.project(recovery.entry)
     inner_leg = shapely.shortest_line(launch.entry, line)
     through = Routes(_without(region, inner_leg, opening_m / 16), detail_m)
-    if not shapely.dwithin(recovery.entry, line, opening_m / 8):
+    if not _on(region.exterior, recovery):
         ring = _part(line, start, start - opening_m)
         way = through.between(ring[-1], recovery.leg[-1])
         yield _chain(launch.leg[:-1], ring, way, recovery.leg[::-1])

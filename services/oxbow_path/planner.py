@@ -92,12 +92,14 @@ def _waters(request: PathRequest, spacing_m: float) -> Waters:
     free, water = (shapely.transform(polygon, turn) for polygon in (request.space.free, request.space.water))
     shapely.prepare([free, water])
     shore = Routes(water, spacing_m)
+    clearance_m = float(shapely.distance(free.exterior, water.exterior)) / 2
     (launch, recovery) = turn(np.array([request.launch, request.recovery]))
     return Waters(
         cells=request.decomposition.cells,
         free=free,
+        water=water,
         probe=Probe.over(free, PROBE_PITCH * spacing_m),
         routes=Routes(free, PROBE_PITCH * spacing_m),
-        launch=access(tuple(launch), free, shore, "LaunchPoint"),
-        recovery=access(tuple(recovery), free, shore, "RecoveryPoint"),
+        launch=access(tuple(launch), free, shore, clearance_m=clearance_m, where="LaunchPoint"),
+        recovery=access(tuple(recovery), free, shore, clearance_m=clearance_m, where="RecoveryPoint"),
     )

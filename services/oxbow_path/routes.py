@@ -15,13 +15,19 @@ import shapely
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from shapely import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray, Place
 from oxbow.errors import Internal
 
-__all__ = ["Indices", "Routes"]
+__all__ = ["Indices", "Routes", "taut"]
 
 Indices = npt.NDArray[np.intp]
+
+LEAST_STEP_M = 1e-9
+
+TAUT_POINTS = 200
+"""Into how many steps a route is divided before it is pulled tight."""
 
 
 class Routes:
@@ -100,7 +106,8 @@ class _Mesh:
     def _graph(self) -> csr_array[np.float64]:
         pairs = self.side_edge[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
         a, b = pairs[(pairs >= 0).all(axis=1)].T
-        weight = np.hypot(*(self.midpoints[a] - self.midpoints[b]).T)
+        # A sparse sum drops zeros, and two edges of a flat triangle may share their midpoint.
+        weight = np.hypot(*(self.midpoints[a] - self.midpoints[b]).T) + LEAST_STEP_M
         n = len(self.midpoints)
         one_way = csr_array((weight, (a, b)), shape=(n, n))
         return csr_array(one_way + one_way.T)
@@ -113,3 +120,20 @@ class _Mesh:
         """The inner edges of the triangle at a place."""
         sides = self.side_edge[self.triangle_at(place)]
         return np.asarray(sides[sides >= 0])
+
+
+def taut(route: LineString, water: BaseGeometry) -> LineString:
+    """A route pulled tight: from each vertex straight on to the farthest one that the water lets see.
+
+    Backward and forward, over points spread along the route, so that bends shrink to the corners of the shore.
+    """
+    for _ in range(2):
+        points = shapely.get_coordinates(shapely.segmentize(route, route.length / TAUT_POINTS))[::-1]
+        kept = [0]
+        while kept[-1] < len(points) - 1:
+            ahead = points[kept[-1] + 1 :]
+            sights = shapely.linestrings(np.stack([np.broadcast_to(points[kept[-1]], ahead.shape), ahead], axis=1))
+            seen = np.flatnonzero(shapely.covers(water, sights))
+            kept.append(kept[-1] + 1 + int(seen[-1] if len(seen) else 0))
+        route = LineString(points[kept])
+    return route

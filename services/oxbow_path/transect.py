@@ -38,6 +38,7 @@ class Waters:
 
     cells: tuple[Cell, ...]
     free: Polygon
+    water: Polygon
     probe: Probe
     routes: Routes
     launch: Access
@@ -114,7 +115,14 @@ def try_pattern(waters: Waters, pattern: Pattern) -> Trial:
     )
     region = _straightened(walk.region, waters, STRAIGHTENING * pattern.spacing_m)
     region = _accessible(region, waters, pattern.half_width_m)
-    path = joined(region, waters.launch, waters.recovery, opening_m=cut_m, detail_m=pattern.half_width_m)
+    path = joined(
+        region,
+        waters.launch,
+        waters.recovery,
+        (waters.free, waters.water),
+        opening_m=cut_m,
+        detail_m=pattern.half_width_m,
+    )
     return Trial(pattern, circuit, Walk(region, walk.cuts, walk.enclosed), path)
 
 
