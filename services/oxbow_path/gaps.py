@@ -8,11 +8,12 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 from shapely import LineString, Point, Polygon
+from shapely.ops import substring
 
 from oxbow.contracts import FloatArray
 from oxbow_path.probe import Probe
 from oxbow_path.routes import Indices, Routes
-from oxbow_path.walk import Walk, band, grown, largest, simply_connected
+from oxbow_path.walk import Brush, Walk, largest, simply_connected
 
 __all__ = ["branch_to", "reach_gaps"]
 
@@ -20,7 +21,7 @@ ROUNDS = 6
 
 
 def reach_gaps(
-    walk: Walk, probe: Probe, routes: Routes, *, reach_m: float, half_width_m: float, cut_width_m: float
+    walk: Walk, brush: Brush, probe: Probe, routes: Routes, *, reach_m: float, cut_width_m: float
 ) -> Walk:
     """Grow branches into the gaps, worst first, until none is deeper than `reach_m` (or `ROUNDS` are over).
 
@@ -34,15 +35,14 @@ def reach_gaps(
         if len(gaps) == 0:
             break
         inside = shapely.contains_xy(walk.region, gaps[:, 0], gaps[:, 1])
-        apart_m = reach_m + half_width_m
+        apart_m = reach_m + brush.half_width_m
         slits = [
             shapely.buffer(_lengthened(shapely.shortest_line(Point(gap), walk.ring), cut_width_m), cut_width_m / 2)
             for gap in _spread(gaps[inside], apart_m)
         ]
-        branches = list(_branches(gaps[~inside], walk.region, routes, apart_m, half_width_m))
-        region = largest(
-            grown(walk.region, band(branches, half_width_m), routes.water).difference(shapely.union_all(slits))
-        )
+        branches = list(_branches(gaps[~inside], walk.region, brush, routes, apart_m))
+        grown = walk.region.union(brush.bands(branches))
+        region = largest(grown.difference(shapely.union_all(slits)))
         walk = simply_connected(region, probe, cut_width_m=cut_width_m, reach_m=reach_m)
     return walk
 
@@ -58,7 +58,7 @@ def _spread(points: FloatArray, apart_m: float) -> Iterator[FloatArray]:
 
 
 def _branches(
-    gaps: FloatArray, region: Polygon, routes: Routes, apart_m: float, overlap_m: float
+    gaps: FloatArray, region: Polygon, brush: Brush, routes: Routes, apart_m: float
 ) -> Iterator[LineString]:
     """A branch for each gap that no earlier branch of this round has come near."""
     index = cKDTree(gaps)
@@ -67,8 +67,8 @@ def _branches(
     for number, gap in enumerate(gaps):
         if reached[number]:
             continue
-        branch = branch_to(gap, region, routes, goals, overlap_m)
-        yield branch
+        branch = branch_to(gap, region, routes, goals, brush.half_width_m)
+        yield _shortened(branch, min(brush.margin_m, branch.length / 2))
         steps = shapely.get_coordinates(shapely.segmentize(branch, apart_m / 4)) if branch.length else gap[None]
         for near in index.query_ball_point(steps, apart_m):
             reached[near] = True
@@ -82,6 +82,12 @@ def branch_to(gap: FloatArray, region: Polygon, routes: Routes, goals: Indices, 
         return _lengthened(straight, overlap_m)
     route = routes.route(gap, goals)
     return straight if route is None else route
+
+
+def _shortened(line: LineString, by_m: float) -> LineString:
+    """The line without its first `by_m` metres: what they would reach is covered from where it now ends."""
+    rest = substring(line, by_m, line.length)
+    return rest if isinstance(rest, LineString) else line
 
 
 def _lengthened(line: LineString, extra_m: float) -> LineString:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -32,6 +31,9 @@ FIRST_SPACING = 1.15
 
 REACHES = (1.5, 1.3, 1.8)
 PHASES = (0.25, 0.75)
+REACH_FOR_SPACING = 0.6
+"""The fitting spacing falls about as the reach to this power."""
+
 PROBE_PITCH = 0.35
 """Pitch of the probe grid, in nominal spacings."""
 
@@ -69,11 +71,21 @@ def plan_transects(request: PathRequest) -> TransectPlan:
 
 
 def _trials(waters: Waters, budget: Budget, first_spacing_m: float) -> Iterator[Trial]:
-    spacing_m = first_spacing_m
-    for reach, phase in itertools.product(REACHES, PHASES):
-        for trial in fitted(partial(try_pattern, waters), Pattern(spacing_m, reach, phase), budget):
-            spacing_m = trial.pattern.spacing_m
-            yield trial
+    """Fit the middle reach at every phase, then the other reaches at the phase that did best."""
+    attempt = partial(try_pattern, waters)
+    best, spacing_m = None, first_spacing_m
+    for phase in PHASES:
+        fit = fitted(attempt, Pattern(spacing_m, REACHES[0], phase), budget)
+        yield from fit
+        spacing_m = fit[-1].pattern.spacing_m
+        if best is None or _score(fit[-1], waters, budget) < _score(best, waters, budget):
+            best = fit[-1]
+    if best is None:
+        raise ValueError("no phases to try")
+    for reach in REACHES[1:]:
+        # Less reach asks for more branches, which a wider spacing has to pay for.
+        spacing_m = best.pattern.spacing_m * float((REACHES[0] / reach) ** REACH_FOR_SPACING)
+        yield from fitted(attempt, Pattern(spacing_m, reach, best.pattern.phase), budget)
 
 
 def _score(trial: Trial, waters: Waters, budget: Budget) -> float:

@@ -58,7 +58,7 @@ class Probe:
     def distances(self, line: BaseGeometry) -> FloatArray:
         """Distance of every probe point to a line, shape (n,)."""
         steps, _ = self.steps([line])
-        distance, _ = cKDTree(steps).query(self.points)
+        distance, _ = cKDTree(steps, balanced_tree=False, compact_nodes=False).query(self.points)
         return np.asarray(distance)
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 from oxbow_path.transect import Pattern, Trial
 
@@ -13,8 +13,11 @@ __all__ = ["Budget", "fitted"]
 TURNS = 8
 """Trials for one pattern before the best so far is taken."""
 
-SENSITIVITY = 1.1
-"""Length falls about as spacing to this power: faster than its inverse, since wide spacings also skip inlets."""
+LEAST_STEP = 0.1
+"""Least share of the way between two known spacings that a trial lies from either."""
+
+SENSITIVITY = 1.0
+"""Length falls about as the spacing to this power."""
 
 
 @dataclass(frozen=True)
@@ -35,35 +38,34 @@ class Budget:
         )
 
 
-def fitted(attempt: Callable[[Pattern], Trial], start: Pattern, budget: Budget) -> Iterator[Trial]:
-    """Try spacings until one uses the length well; every trial is yielded, the fitting ones among them.
+def fitted(attempt: Callable[[Pattern], Trial], start: Pattern, budget: Budget) -> list[Trial]:
+    """All trials of one pattern, until a spacing uses the length well.
 
-    The report multiplies the spacing by length / limit. This does the same until a spacing too small and one too
-    large are known, and then interpolates between their logarithms.
+    The report multiplies the spacing by length / limit. This does the same, with the sensitivity that the last two
+    trials showed, until a spacing too small and one too large are known; then it interpolates between the two.
     """
-    too_long: Trial | None = None
-    fitting: Trial | None = None
+    trials: list[Trial] = []
     spacing_m = max(start.spacing_m, budget.least_spacing_m)
-    for _ in range(TURNS):
-        trial = attempt(Pattern(spacing_m, start.reach, start.phase))
-        yield trial
+    while len(trials) < TURNS:
+        trial = attempt(replace(start, spacing_m=spacing_m))
+        trials.append(trial)
         if budget.is_enough(trial):
-            return
-        if budget.fits(trial.length_m):
-            fitting = trial
-        else:
-            too_long = trial
-        spacing_m = max(_next_spacing(too_long, fitting, budget), budget.least_spacing_m)
+            break
+        spacing_m = max(_next_spacing(trials, budget), budget.least_spacing_m)
+    return trials
 
 
-def _next_spacing(too_long: Trial | None, fitting: Trial | None, budget: Budget) -> float:
-    target_m = (budget.most_m + budget.enough_m) / 2
-    if too_long is not None and fitting is not None:
-        low, high = math.log(too_long.pattern.spacing_m), math.log(fitting.pattern.spacing_m)
-        above, below = math.log(too_long.length_m / target_m), math.log(target_m / fitting.length_m)
-        share = min(max(above / (above + below), 0.1), 0.9)
-        return math.exp(low + share * (high - low))
-    trial = too_long or fitting
-    if trial is None:
-        raise ValueError("no trial to go on from")
-    return trial.pattern.spacing_m * float((trial.length_m / target_m) ** (1 / SENSITIVITY))
+def _next_spacing(trials: Sequence[Trial], budget: Budget) -> float:
+    target = math.log((budget.most_m + budget.enough_m) / 2)
+    points = [(math.log(trial.pattern.spacing_m), math.log(trial.length_m)) for trial in trials]
+    too_small = max((point for point in points if point[1] > target), default=None)
+    too_large = min((point for point in points if point[1] <= target), default=None)
+    if too_small is not None and too_large is not None:
+        share = (too_small[1] - target) / (too_small[1] - too_large[1])
+        share = min(max(share, LEAST_STEP), 1 - LEAST_STEP)
+        return math.exp(too_small[0] + share * (too_large[0] - too_small[0]))
+    sensitivity = SENSITIVITY
+    if len(points) > 1 and points[-1][0] != points[-2][0]:
+        seen = (points[-2][1] - points[-1][1]) / (points[-1][0] - points[-2][0])
+        sensitivity = min(max(seen, SENSITIVITY / 2), SENSITIVITY * 2)
+    return math.exp(points[-1][0] + (points[-1][1] - target) / sensitivity)

@@ -15,7 +15,7 @@ from oxbow_path.legs import Access, joined
 from oxbow_path.probe import Probe
 from oxbow_path.routes import Routes
 from oxbow_path.transects import place_transects
-from oxbow_path.walk import Walk, band, dilated, grown, largest, simply_connected
+from oxbow_path.walk import Brush, Walk, dilated, largest, simply_connected
 
 __all__ = ["Pattern", "Trial", "Waters", "try_pattern"]
 
@@ -103,18 +103,12 @@ def try_pattern(waters: Waters, pattern: Pattern) -> Trial:
         inset_m=pattern.half_width_m + pattern.trim_m,
     )
     cut_m = CUT * pattern.spacing_m
-    region = _started(waters, circuit, pattern.half_width_m)
+    brush = Brush(waters.free, pattern.half_width_m, pattern.trim_m)
+    region = _started(waters, circuit, brush)
     walk = simply_connected(region, waters.probe, cut_width_m=cut_m, reach_m=pattern.reach_m)
-    walk = reach_gaps(
-        walk,
-        waters.probe,
-        waters.routes,
-        reach_m=pattern.reach_m,
-        half_width_m=pattern.half_width_m,
-        cut_width_m=cut_m,
-    )
+    walk = reach_gaps(walk, brush, waters.probe, waters.routes, reach_m=pattern.reach_m, cut_width_m=cut_m)
     region = _straightened(walk.region, waters, STRAIGHTENING * pattern.spacing_m)
-    region = _accessible(region, waters, pattern.half_width_m)
+    region = _accessible(region, waters, brush)
     path = joined(
         region,
         waters.launch,
@@ -126,11 +120,11 @@ def try_pattern(waters: Waters, pattern: Pattern) -> Trial:
     return Trial(pattern, circuit, Walk(region, walk.cuts, walk.enclosed), path)
 
 
-def _started(waters: Waters, circuit: Circuit, half_width_m: float) -> Polygon:
+def _started(waters: Waters, circuit: Circuit, brush: Brush) -> Polygon:
     """The circuit's region; water too narrow for any transect starts from the launch point's entry."""
     if circuit.transects:
-        return dilated(circuit, waters.free, half_width_m)
-    return largest(waters.launch.entry.buffer(half_width_m).intersection(waters.free))
+        return dilated(circuit, brush)
+    return largest(waters.launch.entry.buffer(brush.half_width_m).intersection(waters.free))
 
 
 def _straightened(region: Polygon, waters: Waters, tolerance_m: float) -> Polygon:
@@ -142,14 +136,14 @@ def _straightened(region: Polygon, waters: Waters, tolerance_m: float) -> Polygo
     return Polygon(largest(simple.union(region.intersection(kept))).exterior)
 
 
-def _accessible(region: Polygon, waters: Waters, half_width_m: float) -> Polygon:
+def _accessible(region: Polygon, waters: Waters, brush: Brush) -> Polygon:
     """The region grown to the launch and recovery points' entries; holes that this makes are enclosed."""
     for entry in (waters.launch.entry, waters.recovery.entry):
         if not _touches(region, entry):
             goals = waters.routes.midpoints_in(region)
             place = shapely.get_coordinates(entry)[0]
-            branch = branch_to(place, region, waters.routes, goals, half_width_m)
-            region = Polygon(grown(region, band([branch], half_width_m), waters.free).exterior)
+            branch = branch_to(place, region, waters.routes, goals, brush.half_width_m)
+            region = Polygon(largest(region.union(brush.bands([branch]))).exterior)
     return region
 
 

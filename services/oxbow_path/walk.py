@@ -7,8 +7,9 @@ construction.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +21,10 @@ from oxbow.contracts import FloatArray
 from oxbow_path.circuit import Circuit
 from oxbow_path.probe import Probe, covered
 
-__all__ = ["Walk", "band", "dilated", "grown", "largest", "simply_connected"]
+__all__ = ["Brush", "Walk", "dilated", "largest", "simply_connected"]
+
+CORE = 0.5
+"""Half width of a band in narrows, as a share of its half width in the open."""
 
 NARROWINGS = 8
 AREA_TOLERANCE = 1e-6
@@ -47,27 +51,43 @@ def largest(geometry: BaseGeometry) -> Polygon:
     return Polygon() if len(polygons) == 0 else polygons[np.argmax(shapely.area(polygons))]
 
 
-def dilated(circuit: Circuit, free: Polygon, half_width_m: float) -> Polygon:
-    """The circuit's lines, dilated and clipped.
+@dataclass(frozen=True)
+class Brush:
+    """Turns lines into bands inside the free space.
 
-    Transects get flat ends, so that a trimmed one stays short of the shore; links reach over what they join.
+    A band is `half_width_m` wide on either side where that keeps `margin_m` from the shore: water so near to it is
+    covered from there, and the path need not follow every bend. In narrows only the core of the band remains, so
+    that the path runs out and back near their middle, and what was connected stays so.
     """
-    transects = shapely.buffer(np.asarray(circuit.transects), half_width_m, cap_style="flat")
-    links = band(circuit.links, half_width_m)
-    return largest(shapely.union_all([*transects, *links]).intersection(free))
+
+    free: Polygon
+    half_width_m: float
+    margin_m: float
+
+    @cached_property
+    def _roomy(self) -> BaseGeometry:
+        return self.free.buffer(-self.margin_m)
+
+    def bands(self, lines: Sequence[LineString], *, flat: bool = False) -> BaseGeometry:
+        """The bands of some lines; with flat ends they end where the lines end."""
+        wide, core = (
+            shapely.union_all(
+                shapely.buffer(
+                    np.asarray(lines),
+                    width_m,
+                    cap_style="flat" if flat else "square",
+                    join_style="mitre",
+                    mitre_limit=1.5,
+                )
+            )
+            for width_m in (self.half_width_m, CORE * self.half_width_m)
+        )
+        return wide.intersection(self._roomy).union(core.intersection(self.free))
 
 
-def band(lines: Sequence[LineString], half_width_m: float) -> list[Polygon]:
-    """Lines dilated with square ends and sharp, but not spiky, corners: few waypoints."""
-    bands = shapely.buffer(
-        np.asarray(lines), half_width_m, cap_style="square", join_style="mitre", mitre_limit=1.5
-    )
-    return list(np.atleast_1d(bands))
-
-
-def grown(region: Polygon, bands: Iterable[BaseGeometry], free: Polygon) -> Polygon:
-    """The region with more bands joined to it, clipped by the free space."""
-    return largest(shapely.union_all([region, shapely.union_all(list(bands)).intersection(free)]))
+def dilated(circuit: Circuit, brush: Brush) -> Polygon:
+    """The circuit's lines, dilated: transects end where they end, links reach over what they join."""
+    return largest(brush.bands(circuit.transects, flat=True).union(brush.bands(circuit.links)))
 
 
 def simply_connected(region: Polygon, probe: Probe, *, cut_width_m: float, reach_m: float) -> Walk:
