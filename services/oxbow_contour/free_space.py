@@ -19,9 +19,9 @@ __all__ = ["Eroded", "default_tolerance_m", "erode_water"]
 REACH = 0.25
 """How far, in spacings, water that erosion may leave can be from the free space; farther, it is an arm lost."""
 
-MANY_POINTS = 50_000
-"""Simplified contours of more points than this are made coarser, and are not refined for the sake of an arm:
-it would take many seconds.
+MANY_POINTS, TOO_MANY_POINTS = 50_000, 200_000
+"""Contours of more points than the first are simplified more coarsely, to a bound, and not refined for the sake of
+an arm; those of more than the second, without a bound: eroding them would take minutes.
 """
 
 COARSEST, FINEST = 1 / 20, 1 / 2000
@@ -75,21 +75,24 @@ def erode_water(
     """
     asked_m = default_tolerance_m(safety_m, spacing_m) if tolerance_m is None else tolerance_m
     simplified = simplify(water, asked_m)
-    while tolerance_m is None and _is_long(simplified, spacing_m):
+    while tolerance_m is None and _is_too_long(simplified, spacing_m):
         simplified = simplify(water, 4 * simplified.tolerance_m)
+    may_refine = simplified.tolerance_m <= asked_m and simplified.points_out <= MANY_POINTS
     while True:
         parts = _shrunk(simplified, safety_m)
         if not parts:
             _require_room(water, safety_m, is_certain=simplified.tolerance_m == 0)
-        elif is_safe(parts[0], water, safety_m) and not _closes_arms(simplified, parts[0], safety_m, spacing_m):
-            return Eroded(parts=tuple(parts), simplified=simplified, warnings=_warnings(simplified, asked_m))
+        elif is_safe(parts[0], water, safety_m):
+            if not (may_refine and _closes_arms(simplified, parts[0], safety_m, spacing_m)):
+                return Eroded(parts=tuple(parts), simplified=simplified, warnings=_warnings(simplified, asked_m))
         elif simplified.tolerance_m == 0:
             raise Internal(f"free space is nearer than {safety_m:g} m to the shore", where="contour")
         simplified = simplify(water, _finer_m(simplified.tolerance_m, spacing_m))
 
 
-def _is_long(simplified: Simplified, spacing_m: float) -> bool:
-    return simplified.points_out > MANY_POINTS and simplified.tolerance_m < COARSEST * spacing_m
+def _is_too_long(simplified: Simplified, spacing_m: float) -> bool:
+    bound = MANY_POINTS if simplified.tolerance_m < COARSEST * spacing_m else TOO_MANY_POINTS
+    return simplified.points_out > bound
 
 
 def _finer_m(tolerance_m: float, spacing_m: float) -> float:
@@ -149,7 +152,7 @@ def _warnings(simplified: Simplified, asked_m: float) -> tuple[str, ...]:
     if tolerance_m < asked_m:
         warnings.append(f"contours are simplified to {tolerance_m:g} m: {asked_m:g} m might have closed an arm")
     if tolerance_m > asked_m:
-        warnings.append(f"contours are simplified to {tolerance_m:g} m: at {asked_m:g} m they had many points")
+        warnings.append(f"contours are simplified to {tolerance_m:g} m: at {asked_m:g} m they had too many points")
     if tolerance_m > 0 and points > MANY_POINTS:
         warnings.append(f"contours of {points} points: it was not checked whether simplification closes an arm")
     return tuple(warnings)

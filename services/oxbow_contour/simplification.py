@@ -16,7 +16,10 @@ from oxbow_contour.strips import IndexArray, deviations, strip_ends
 
 __all__ = ["Simplified", "simplify"]
 
-ROUNDING = 1e-9  # relative
+BoolArray = npt.NDArray[np.bool_]
+
+ROUNDING = 1e-9
+"""Of distances, relative."""
 
 
 @dataclass(frozen=True)
@@ -64,42 +67,72 @@ def simplify(water: Sequence[Polygon], tolerance_m: float) -> Simplified:
     is_kept = np.zeros(len(points), dtype=bool)
     is_kept[np.concatenate(ends)] = True
     closing = starts + sizes - 1
-
-    while len(middles := _middles_of_faulty_strips(points, is_kept, starts, closing, tolerance_m)):
-        is_kept[middles] = True
-
-    simple = [points[s : c + 1][is_kept[s : c + 1]] for s, c in zip(starts, closing, strict=True)]
     counts = [1 + len(part.interiors) for part in water]
+
+    while True:
+        simple = [points[s : c + 1][is_kept[s : c + 1]] for s, c in zip(starts, closing, strict=True)]
+        parts = [Polygon(group[0], group[1:]) for group in _grouped(simple, counts)]
+        is_sound = len(parts) == 1 and parts[0].is_valid  # then no two edges meet: no need to look for them
+        edges = _Edges.between(points, is_kept, starts, closing)
+        faulty = edges.is_wide(tolerance_m)
+        if not faulty.any() and not is_sound:
+            faulty = edges.is_met()
+        if not faulty.any():
+            break
+        is_kept[edges.middle[faulty]] = True
+
     return Simplified(
-        parts=tuple(_polygon(group) for group in _grouped(simple, counts)),
+        parts=tuple(parts) if is_sound else tuple(_without_islands(part) for part in parts),
         tolerance_m=tolerance_m,
         points_in=len(points) - len(rings),
         points_out=int(is_kept.sum()) - len(rings),
     )
 
 
-def _middles_of_faulty_strips(
-    points: FloatArray, is_kept: npt.NDArray[np.bool_], starts: IndexArray, closing: IndexArray, tolerance_m: float
-) -> IndexArray:
-    """The middle points of all strips that meet another edge, or do not hold their points."""
-    kept = np.flatnonzero(is_kept)
-    is_edge = ~np.isin(kept[:-1], closing)
-    first, last = kept[:-1][is_edge], kept[1:][is_edge]
-    strips = np.flatnonzero(last - first > 1)
-    if not len(strips):
-        return strips
-    is_wide = deviations(points, first[strips], last[strips]) > tolerance_m * (1 + ROUNDING)
-    edges = np.asarray(shapely.linestrings(np.stack([points[first], points[last]], axis=1)))
-    mine, other = STRtree(edges).query(edges[strips], predicate="intersects")
-    mine = strips[mine]
-    follower = np.arange(1, len(edges) + 1)
-    ring_first = np.searchsorted(first, starts)
-    follower[np.searchsorted(last, closing)] = ring_first
-    is_foreign = (mine != other) & (follower[mine] != other) & (follower[other] != mine)
-    meets = np.zeros(len(edges), dtype=np.bool_)
-    meets[mine[is_foreign]] = True
-    faulty = strips[is_wide | meets[strips]]
-    return (first[faulty] + last[faulty]) // 2
+@dataclass(frozen=True)
+class _Edges:
+    """Simplified edges, each from point `first` to point `last`, and `follower`, the next edge of its ring."""
+
+    points: FloatArray
+    first: IndexArray
+    last: IndexArray
+    follower: IndexArray
+
+    @classmethod
+    def between(cls, points: FloatArray, is_kept: BoolArray, starts: IndexArray, closing: IndexArray) -> _Edges:
+        """The edges between kept points; rings go from point `starts` to point `closing`."""
+        kept = np.flatnonzero(is_kept)
+        is_edge = ~np.isin(kept[:-1], closing)
+        first, last = kept[:-1][is_edge], kept[1:][is_edge]
+        follower = np.arange(1, len(first) + 1)
+        follower[np.searchsorted(last, closing)] = np.searchsorted(first, starts)
+        return cls(points, first, last, follower)
+
+    @property
+    def middle(self) -> IndexArray:
+        return (self.first + self.last) // 2
+
+    @property
+    def is_strip(self) -> BoolArray:
+        """Whether an edge stands for more than one edge of the true contour."""
+        return self.last - self.first > 1
+
+    def is_wide(self, tolerance_m: float) -> BoolArray:
+        """Whether an edge is a strip that does not hold its points."""
+        return self.is_strip & (deviations(self.points, self.first, self.last) > tolerance_m * (1 + ROUNDING))
+
+    def is_met(self) -> BoolArray:
+        """Whether an edge is a strip that meets another edge than its neighbours."""
+        strips = np.flatnonzero(self.is_strip)
+        lines = np.asarray(
+            shapely.linestrings(np.stack([self.points[self.first], self.points[self.last]], axis=1))
+        )
+        mine, other = STRtree(lines).query(lines[strips], predicate="intersects")
+        mine = strips[mine]
+        is_foreign = (mine != other) & (self.follower[mine] != other) & (self.follower[other] != mine)
+        met = np.zeros(len(lines), dtype=np.bool_)
+        met[mine[is_foreign]] = True
+        return met
 
 
 def _grouped(rings: list[FloatArray], counts: list[int]) -> list[list[FloatArray]]:
@@ -107,12 +140,12 @@ def _grouped(rings: list[FloatArray], counts: list[int]) -> list[list[FloatArray
     return [rings[stop - count : stop] for count, stop in zip(counts, stops, strict=True)]
 
 
-def _polygon(rings: list[FloatArray]) -> Polygon | MultiPolygon:
-    """What the first ring surrounds and no other does."""
-    polygon = Polygon(rings[0], rings[1:])
+def _without_islands(polygon: Polygon) -> Polygon | MultiPolygon:
+    """What the exterior ring surrounds and no other does.
+
+    An island nearer to the shore than the tolerance may have changed sides without crossing it.
+    """
     if polygon.is_valid:
         return polygon
-    # An island nearer to the shore than the tolerance may have changed sides without crossing it.
-    islands = shapely.union_all([Polygon(ring) for ring in rings[1:]])
-    rest = Polygon(rings[0]).difference(islands)
+    rest = Polygon(polygon.exterior).difference(shapely.union_all([Polygon(ring) for ring in polygon.interiors]))
     return MultiPolygon([part for part in shapely.get_parts(rest) if isinstance(part, Polygon)])

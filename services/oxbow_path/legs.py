@@ -21,7 +21,7 @@ from oxbow.errors import Infeasible, Internal
 from oxbow_path.routes import Routes, taut
 from oxbow_path.walk import largest
 
-__all__ = ["Access", "access", "joined"]
+__all__ = ["ROUNDING_M", "Access", "access", "joined"]
 
 ROUNDING_M = 1e-6
 """Places nearer to each other than this are one."""

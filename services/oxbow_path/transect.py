@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import shapely
 from shapely import LineString, Point, Polygon
@@ -11,7 +12,7 @@ from shapely import LineString, Point, Polygon
 from oxbow.contracts import Cell
 from oxbow_path.circuit import Circuit, plan_circuit
 from oxbow_path.gaps import branch_to, reach_gaps
-from oxbow_path.legs import Access, joined
+from oxbow_path.legs import ROUNDING_M, Access, joined
 from oxbow_path.probe import Probe
 from oxbow_path.routes import Routes
 from oxbow_path.transects import place_transects
@@ -43,6 +44,11 @@ class Waters:
     routes: Routes
     launch: Access
     recovery: Access
+
+    @property
+    def entries(self) -> tuple[Point, Point]:
+        """Where the legs from launch and to recovery meet the free space."""
+        return self.launch.entry, self.recovery.entry
 
 
 @dataclass(frozen=True)
@@ -104,11 +110,13 @@ def try_pattern(waters: Waters, pattern: Pattern) -> Trial:
     )
     cut_m = CUT * pattern.spacing_m
     brush = Brush(waters.free, pattern.half_width_m, pattern.trim_m)
-    region = _started(waters, circuit, brush)
-    walk = simply_connected(region, waters.probe, cut_width_m=cut_m, reach_m=pattern.reach_m)
+    connected = partial(simply_connected, probe=waters.probe, cut_width_m=cut_m, reach_m=pattern.reach_m)
+    walk = connected(_accessible(_started(waters, circuit, brush), waters, brush))
     walk = reach_gaps(walk, brush, waters.probe, waters.routes, reach_m=pattern.reach_m, cut_width_m=cut_m)
     region = _straightened(walk.region, waters, STRAIGHTENING * pattern.spacing_m)
-    region = _accessible(region, waters, brush)
+    region = connected(_accessible(region, waters, brush)).region
+    if not _touches_all(region, waters):
+        region = Polygon(_accessible(region, waters, brush).exterior)
     path = joined(
         region,
         waters.launch,
@@ -130,22 +138,20 @@ def _started(waters: Waters, circuit: Circuit, brush: Brush) -> Polygon:
 def _straightened(region: Polygon, waters: Waters, tolerance_m: float) -> Polygon:
     """The region with fewer vertices, still inside the free space, and unchanged near the entries."""
     simple = region.simplify(tolerance_m).intersection(waters.free)
-    kept = shapely.union_all(
-        [entry.buffer(4 * tolerance_m) for entry in (waters.launch.entry, waters.recovery.entry)]
-    )
+    kept = shapely.union_all([entry.buffer(4 * tolerance_m) for entry in waters.entries])
     return Polygon(largest(simple.union(region.intersection(kept))).exterior)
 
 
 def _accessible(region: Polygon, waters: Waters, brush: Brush) -> Polygon:
-    """The region grown to the launch and recovery points' entries; holes that this makes are enclosed."""
-    for entry in (waters.launch.entry, waters.recovery.entry):
-        if not _touches(region, entry):
+    """The region grown to the launch and recovery points' entries."""
+    for entry in waters.entries:
+        if not shapely.dwithin(region, entry, ROUNDING_M):
             goals = waters.routes.midpoints_in(region)
             place = shapely.get_coordinates(entry)[0]
             branch = branch_to(place, region, waters.routes, goals, brush.half_width_m)
-            region = Polygon(largest(region.union(brush.bands([branch]))).exterior)
+            region = largest(region.union(brush.bands([branch])))
     return region
 
 
-def _touches(region: Polygon, entry: Point) -> bool:
-    return bool(shapely.dwithin(region, entry, 1e-6))
+def _touches_all(region: Polygon, waters: Waters) -> bool:
+    return all(shapely.dwithin(region, entry, ROUNDING_M) for entry in waters.entries)
