@@ -153,6 +153,6 @@ def _warnings(simplified: Simplified, asked_m: float) -> tuple[str, ...]:
         warnings.append(f"contours are simplified to {tolerance_m:g} m: {asked_m:g} m might have closed an arm")
     if tolerance_m > asked_m:
         warnings.append(f"contours are simplified to {tolerance_m:g} m: at {asked_m:g} m they had too many points")
-    if tolerance_m > 0 and points > MANY_POINTS:
-        warnings.append(f"contours of {points} points: it was not checked whether simplification closes an arm")
+    if tolerance_m > asked_m or (tolerance_m > 0 and points > MANY_POINTS):
+        warnings.append("the contours are very long: it was not checked whether simplification closes an arm")
     return tuple(warnings)

@@ -316,3 +316,12 @@ def test_a_million_points():
     assert len(space.free.interiors) == 1
     assert is_safe(space.free, true_water(outline, [island]), 20.0)
     assert space.free.area > 0.95 * (outline.area - island.area)
+
+
+def test_very_long_contours_are_simplified_more_coarsely():
+    outline = star(np.random.default_rng(0), (0, 0), 1000, 80_000, 0.01)
+    space = free_space(outline, safety_m=5.0, spacing_m=200.0)
+    assert space.tolerance_m > default_tolerance_m(5.0, 200.0)
+    assert "too many points" in space.warnings[0]
+    assert is_safe(space.free, [outline], 5.0)
+    assert space.free.area > 0.93 * np.pi * 995**2
