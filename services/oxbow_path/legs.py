@@ -26,6 +26,9 @@ __all__ = ["ROUNDING_M", "Access", "access", "joined"]
 ROUNDING_M = 1e-6
 """Places nearer to each other than this are one."""
 
+SIGHTS = 200
+"""How many places of the ring, nearest first, are tried for one in sight of an entry."""
+
 HALVINGS = 12
 """How often the opening of the ring may be halved until the legs fit."""
 
@@ -118,7 +121,7 @@ def joined(
     free, water = (polygon.buffer(ROUNDING_M) for polygon in waters)
     for _ in range(HALVINGS):
         allowed = [_corridor(leg, water, opening_m) for leg in (launch, recovery)]
-        for path in _candidates(region, launch, recovery, opening_m, detail_m):
+        for path in _candidates(region, launch, recovery, waters[0], opening_m, detail_m):
             legs = path.difference(free)
             if path.is_simple and legs.difference(shapely.union_all(allowed)).length < ROUNDING_M:
                 return path
@@ -133,23 +136,36 @@ def _corridor(leg: Access, water: BaseGeometry, width_m: float) -> BaseGeometry:
 
 
 def _candidates(
-    region: Polygon, launch: Access, recovery: Access, opening_m: float, detail_m: float
+    region: Polygon, launch: Access, recovery: Access, free: Polygon, opening_m: float, detail_m: float
 ) -> Iterator[LineString]:
     if launch.place == recovery.place:
-        return _closed(region.exterior, launch, opening_m)
+        return _closed(region.exterior, launch, free, opening_m)
+    # What the region encloses may be land.
+    inside = largest(region.intersection(free))
     if _on(region.exterior, recovery) and not _on(region.exterior, launch):
-        return (path.reverse() for path in _open(region, recovery, launch, opening_m, detail_m))
-    return _open(region, launch, recovery, opening_m, detail_m)
+        return (path.reverse() for path in _open(inside, recovery, launch, opening_m, detail_m))
+    return _open(inside, launch, recovery, opening_m, detail_m)
 
 
 def _on(ring: LinearRing, access: Access) -> bool:
     return bool(shapely.dwithin(access.entry, ring, ROUNDING_M))
 
 
-def _closed(ring: LinearRing, launch: Access, opening_m: float) -> Iterator[LineString]:
+def _meeting(ring: LineString, entry: Point, free: Polygon) -> float:
+    """Where along the ring a leg meets it: at the nearest place that is in sight."""
+    sights = shapely.linestrings(
+        [[entry.coords[0], place] for place in (ring.interpolate(ring.project(entry)).coords[0], *ring.coords)]
+    )
+    nearest_first = sights[np.argsort(shapely.length(sights), kind="stable")][:SIGHTS]
+    seen = nearest_first[shapely.covers(free.buffer(ROUNDING_M), nearest_first)]
+    sight = seen[0] if len(seen) else nearest_first[0]
+    return float(ring.project(Point(sight.coords[-1])))
+
+
+def _closed(ring: LinearRing, launch: Access, free: Polygon, opening_m: float) -> Iterator[LineString]:
     """Out to the ring, round it, and back beside the way out."""
     line = LineString(ring)
-    at = line.project(launch.entry)
+    at = _meeting(line, launch.entry, free)
     round_trip = _part(line, at + opening_m / 2, at - opening_m / 2)
     for side in (1.0, -1.0):
         back = _beside(launch.leg, opening_m, side)[::-1]
@@ -169,18 +185,18 @@ def _beside(leg: FloatArray, offset_m: float, side: float) -> FloatArray:
 
 
 def _open(
-    region: Polygon, launch: Access, recovery: Access, opening_m: float, detail_m: float
+    inside: Polygon, launch: Access, recovery: Access, opening_m: float, detail_m: float
 ) -> Iterator[LineString]:
-    """Round the ring, and through the region to the recovery point.
+    """Round the ring, and through its inside to the recovery point.
 
-    Where the recovery point lies inside the region, the whole ring is travelled first. Otherwise the way
-    through the region divides the ring: one side, back through the middle, the other side.
+    Where the recovery point lies inside, the whole ring is travelled first. Otherwise the way through the inside
+    divides the ring: one side, back through the middle, the other side.
     """
-    line = LineString(region.exterior)
-    start, end = line.project(launch.entry), line.project(recovery.entry)
-    inner_leg = shapely.shortest_line(launch.entry, line)
-    through = Routes(_without(region, inner_leg, opening_m / 16), detail_m)
-    if not _on(region.exterior, recovery):
+    line = LineString(inside.exterior)
+    start, end = (_meeting(line, leg.entry, inside) for leg in (launch, recovery))
+    inner_leg = LineString([launch.entry, line.interpolate(start)])
+    through = Routes(_without(inside, inner_leg, opening_m / 16), detail_m)
+    if not _on(inside.exterior, recovery):
         ring = _part(line, start, start - opening_m)
         way = through.between(ring[-1], recovery.leg[-1])
         yield _chain(launch.leg[:-1], ring, way, recovery.leg[::-1])
