@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -14,6 +15,7 @@ from oxbow.errors import Infeasible
 from oxbow.sweep import to_sweep
 from oxbow_path.legs import access
 from oxbow_path.probe import Probe
+from oxbow_path.remainder import with_remainder
 from oxbow_path.routes import Routes
 from oxbow_path.spacing import Budget, fitted
 from oxbow_path.transect import Pattern, Trial, Waters, try_pattern
@@ -33,6 +35,9 @@ REACHES = (1.5, 1.3, 1.8)
 PHASES = (0.25, 0.75)
 REACH_FOR_SPACING = 0.6
 """The fitting spacing falls about as the reach to this power."""
+
+MANY_POINTS = 80_000
+"""With more probe points than these, one pattern is fitted and not several."""
 
 PROBE_PITCH = 0.35
 """Pitch of the probe grid, in nominal spacings."""
@@ -64,28 +69,36 @@ def plan_transects(request: PathRequest) -> TransectPlan:
     if not fitting:
         shortest = min(trial.length_m for trial in trials)
         raise Infeasible(
-            f"the longest path allowed is {request.length_m:.0f} m, the shortest found {shortest:.0f} m",
+            f"is {request.length_m:.0f} m; the shortest path from launch to recovery is {shortest:.0f} m",
             "Master_length",
         )
-    return TransectPlan(waters, min(fitting, key=lambda trial: _score(trial, waters, budget)), trials)
+    chosen = min(fitting, key=lambda trial: _score(trial, waters, budget))
+    if chosen.pattern.spacing_m > request.min_spacing_m:
+        chosen = with_remainder(chosen, waters, budget)
+    return TransectPlan(waters, chosen, trials)
 
 
 def _trials(waters: Waters, budget: Budget, first_spacing_m: float) -> Iterator[Trial]:
-    """Fit the middle reach at every phase, then the other reaches at the phase that did best."""
+    """Fit the middle reach at every phase, then the other reaches at the phase that did best.
+
+    Very long paths are fitted once. Where nothing fits, the last trial has neither transects nor branches.
+    """
     attempt = partial(try_pattern, waters)
-    best, spacing_m = None, first_spacing_m
-    for phase in PHASES:
-        fit = fitted(attempt, Pattern(spacing_m, REACHES[0], phase), budget)
-        yield from fit
-        spacing_m = fit[-1].pattern.spacing_m
-        if best is None or _score(fit[-1], waters, budget) < _score(best, waters, budget):
-            best = fit[-1]
-    if best is None:
-        raise ValueError("no phases to try")
-    for reach in REACHES[1:]:
+    few = len(waters.probe.points) > MANY_POINTS
+    fits = []
+    for phase in PHASES[:1] if few else PHASES:
+        fits.append(fitted(attempt, Pattern(first_spacing_m, REACHES[0], phase), budget))
+        first_spacing_m = fits[-1][-1].pattern.spacing_m
+        yield from fits[-1]
+    best = min((fit[-1] for fit in fits), key=lambda trial: _score(trial, waters, budget))
+    for reach in () if few else REACHES[1:]:
         # Less reach asks for more branches, which a wider spacing has to pay for.
         spacing_m = best.pattern.spacing_m * float((REACHES[0] / reach) ** REACH_FOR_SPACING)
-        yield from fitted(attempt, Pattern(spacing_m, reach, best.pattern.phase), budget)
+        fits.append(fitted(attempt, Pattern(spacing_m, reach, best.pattern.phase), budget))
+        yield from fits[-1]
+    if not any(budget.fits(trial.length_m) for fit in fits for trial in fit):
+        x0, y0, x1, y1 = waters.free.bounds
+        yield attempt(Pattern(2 * math.hypot(x1 - x0, y1 - y0), REACHES[0], PHASES[0]))
 
 
 def _score(trial: Trial, waters: Waters, budget: Budget) -> float:
@@ -107,6 +120,7 @@ def _waters(request: PathRequest, spacing_m: float) -> Waters:
     clearance_m = float(shapely.distance(free.exterior, water.exterior)) / 2
     (launch, recovery) = turn(np.array([request.launch, request.recovery]))
     return Waters(
+        spacing_m=spacing_m,
         cells=request.decomposition.cells,
         free=free,
         water=water,

@@ -18,7 +18,7 @@ from oxbow_path.routes import Routes
 from oxbow_path.transects import place_transects
 from oxbow_path.walk import Brush, Walk, dilated, largest, simply_connected
 
-__all__ = ["Pattern", "Trial", "Waters", "try_pattern"]
+__all__ = ["Pattern", "Trial", "Waters", "finished", "try_pattern"]
 
 LEAST_TRANSECT = 2.0
 """In spacings. Where the water is narrower, out and back along its middle is shorter than transects across."""
@@ -29,14 +29,21 @@ TRIM = 0.8
 CUT = 0.25
 """Width of a cut through the region, in spacings."""
 
+START = 0.1
+"""Radius of the region that a path without transects grows from, in nominal spacings."""
+
 STRAIGHTENING = 0.05
 """How far the walk may be moved to straighten it, in spacings."""
 
 
 @dataclass(frozen=True)
 class Waters:
-    """All that stays the same while the spacing is sought; geometry in the sweep frame."""
+    """All that stays the same while the spacing is sought; geometry in the sweep frame.
 
+    `spacing_m` is the nominal spacing, area / length.
+    """
+
+    spacing_m: float
     cells: tuple[Cell, ...]
     free: Polygon
     water: Polygon
@@ -70,6 +77,11 @@ class Pattern:
     @property
     def reach_m(self) -> float:
         return self.reach * self.half_width_m
+
+    @property
+    def cut_m(self) -> float:
+        """Width of a cut through the region."""
+        return CUT * self.spacing_m
 
     @property
     def trim_m(self) -> float:
@@ -108,31 +120,36 @@ def try_pattern(waters: Waters, pattern: Pattern) -> Trial:
         trim_m=pattern.trim_m,
         inset_m=pattern.half_width_m + pattern.trim_m,
     )
-    cut_m = CUT * pattern.spacing_m
     brush = Brush(waters.free, pattern.half_width_m, pattern.trim_m)
-    connected = partial(simply_connected, probe=waters.probe, cut_width_m=cut_m, reach_m=pattern.reach_m)
+    connected = partial(simply_connected, probe=waters.probe, cut_width_m=pattern.cut_m, reach_m=pattern.reach_m)
     walk = connected(_accessible(_started(waters, circuit, brush), waters, brush))
-    walk = reach_gaps(walk, brush, waters.probe, waters.routes, reach_m=pattern.reach_m, cut_width_m=cut_m)
+    walk = reach_gaps(walk, brush, waters.probe, waters.routes, reach_m=pattern.reach_m, cut_width_m=pattern.cut_m)
     region = _straightened(walk.region, waters, STRAIGHTENING * pattern.spacing_m)
     region = connected(_accessible(region, waters, brush)).region
     if not _touches_all(region, waters):
         region = Polygon(_accessible(region, waters, brush).exterior)
+    return finished(waters, pattern, circuit, Walk(region, walk.cuts, walk.enclosed))
+
+
+def finished(waters: Waters, pattern: Pattern, circuit: Circuit, walk: Walk) -> Trial:
+    """A walk that touches both entries, with its legs."""
     path = joined(
-        region,
+        walk.region,
         waters.launch,
         waters.recovery,
         (waters.free, waters.water),
-        opening_m=cut_m,
+        opening_m=pattern.cut_m,
         detail_m=pattern.half_width_m,
     )
-    return Trial(pattern, circuit, Walk(region, walk.cuts, walk.enclosed), path)
+    return Trial(pattern, circuit, walk, path)
 
 
 def _started(waters: Waters, circuit: Circuit, brush: Brush) -> Polygon:
     """The circuit's region; water too narrow for any transect starts from the launch point's entry."""
     if circuit.transects:
         return dilated(circuit, brush)
-    return largest(waters.launch.entry.buffer(brush.half_width_m).intersection(waters.free))
+    radius_m = min(brush.half_width_m, START * waters.spacing_m)
+    return largest(waters.launch.entry.buffer(radius_m).intersection(waters.free))
 
 
 def _straightened(region: Polygon, waters: Waters, tolerance_m: float) -> Polygon:

@@ -1,0 +1,80 @@
+"""The remainder: what length a fitted path leaves unused is spent on the worst gaps."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from shapely import LineString, Point
+from shapely.ops import substring
+
+from oxbow.contracts import FloatArray
+from oxbow_path.gaps import branch_to
+from oxbow_path.spacing import Budget
+from oxbow_path.transect import Trial, Waters, finished
+from oxbow_path.walk import Brush, Walk, largest, simply_connected
+
+__all__ = ["with_remainder"]
+
+SPURS = 12
+"""At most so many spurs are added."""
+
+SPUR = 0.12
+"""Half width of a spur, in nominal spacings: narrow, so that it parts the water that it runs into."""
+
+LEAST_SHARE = 0.002
+"""A remainder smaller than this share of the length is left."""
+
+SHORTENINGS = 4
+
+
+def with_remainder(trial: Trial, waters: Waters, budget: Budget) -> Trial:
+    """Add spurs to the worst gaps, one after another, while they fit the length and make no gap deeper."""
+    for _ in range(SPURS):
+        left_m = budget.most_m - trial.length_m
+        longer = _with_spur(trial, waters, left_m) if left_m > LEAST_SHARE * budget.most_m else None
+        if longer is None:
+            break
+        trial = longer
+    return trial
+
+
+def _with_spur(trial: Trial, waters: Waters, left_m: float) -> Trial | None:
+    """The trial with a spur towards its worst gap, as long as fits; None if none does."""
+    distance = waters.probe.distances(trial.path)
+    gap, depth_m = waters.probe.points[np.argmax(distance)], float(distance.max())
+    spur = _spur(trial, waters, gap)
+    for _ in range(SHORTENINGS):
+        spur = _end(spur, left_m / 2)
+        longer = _grown(trial, waters, spur)
+        if 0.0 < longer.length_m - trial.length_m <= left_m and (
+            waters.probe.distances(longer.path).max() <= depth_m
+        ):
+            return longer
+        left_m /= 2
+    return None
+
+
+def _spur(trial: Trial, waters: Waters, gap: FloatArray) -> LineString:
+    """From the gap to the walk: to its ring from the inside, into its region from outside."""
+    region = trial.walk.region
+    if shapely.contains_xy(region, *gap):
+        return shapely.shortest_line(Point(gap), region.exterior)
+    goals = waters.routes.midpoints_in(region)
+    return branch_to(gap, region, waters.routes, goals, SPUR * waters.spacing_m)
+
+
+def _end(line: LineString, length_m: float) -> LineString:
+    """The last `length_m` metres of a line."""
+    end = substring(line, max(line.length - length_m, 0.0), line.length)
+    return end if isinstance(end, LineString) else line
+
+
+def _grown(trial: Trial, waters: Waters, spur: LineString) -> Trial:
+    """The trial with a spur: a band outside its region, a slit inside."""
+    region, half_width_m = trial.walk.region, SPUR * waters.spacing_m
+    if shapely.contains_xy(region, *spur.coords[0]):
+        region = largest(region.difference(spur.buffer(half_width_m)))
+    else:
+        region = largest(region.union(Brush(waters.free, half_width_m, 0.0).bands([spur])))
+    walk = simply_connected(region, waters.probe, cut_width_m=trial.pattern.cut_m, reach_m=trial.pattern.reach_m)
+    return finished(waters, trial.pattern, trial.circuit, Walk(walk.region, trial.walk.cuts, trial.walk.enclosed))
