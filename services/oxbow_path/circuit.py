@@ -191,7 +191,7 @@ def _detour(cell: Cell, below: Port, above: Port, inset_m: float) -> LineString:
     enter = above.low + min(inset_m, (above.high - above.low) / 2)
     there = _crossing(cell, (below.u, leave), turn)
     back = _crossing(cell, turn, (above.u, enter))
-    return LineString(np.vstack([there, back[1:]]))
+    return LineString(np.vstack([there, back]))
 
 
 def _between(cell: Cell, u: float) -> float:
@@ -216,6 +216,8 @@ def _crossing(cell: Cell, start: tuple[float, float], end: tuple[float, float]) 
     Between two vertices floor, ceiling and curve are straight, and at every vertex the curve is strictly between
     the other two: it cannot leave the cell.
     """
+    if start[0] == end[0]:
+        return np.array([start, end])
     us, floor, ceiling = _profile(cell, start[0], end[0])
     (u0, v0), (u1, v1) = sorted([start, end])
     height = np.maximum(ceiling - floor, 1e-12)

@@ -63,7 +63,7 @@ def _branches(
     """A branch for each gap that no earlier branch of this round has come near."""
     index = cKDTree(gaps)
     reached = np.zeros(len(gaps), dtype=bool)
-    goals = routes.midpoints_in(region)
+    goals = routes.goals_in(region)
     for number, gap in enumerate(gaps):
         if reached[number]:
             continue
@@ -80,7 +80,7 @@ def branch_to(gap: FloatArray, region: Polygon, routes: Routes, goals: Indices, 
     straight = shapely.shortest_line(Point(gap), region)
     if shapely.covers(routes.water, straight):
         return _lengthened(straight, overlap_m)
-    route = routes.route(gap, goals)
+    route = routes.to_area(gap, region, goals)
     return straight if route is None else route
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from shapely import LinearRing, LineString, Point, Polygon
+from shapely.affinity import rotate
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
@@ -25,6 +26,9 @@ __all__ = ["ROUNDING_M", "Access", "access", "joined"]
 
 ROUNDING_M = 1e-6
 """Places nearer to each other than this are one."""
+
+OTHER_DETAIL = 0.83
+"""Change of the detail from one attempt to the next."""
 
 SIGHTS = 200
 """How many places of the ring, nearest first, are tried for one in sight of an entry."""
@@ -78,7 +82,7 @@ def access(place: Place, free: Polygon, water: Routes, *, clearance_m: float, wh
         return Access(shapely.get_coordinates(straight), ashore=True)
     if water.water.covers(straight):
         return Access(shapely.get_coordinates(straight))
-    route = water.route(place, water.midpoints_in(free))
+    route = water.to_area(np.array(place), free, water.goals_in(free))
     if route is None:
         raise Infeasible(f"no way through the water leads from {place} to the free space", where)
     roomy = water.water.buffer(-clearance_m).union(point.buffer(4 * clearance_m).intersection(water.water))
@@ -109,7 +113,7 @@ def joined(
         Width of the ring's opening at most; it is a tenth of the shorter leg, and halved until the legs fit
         through without a crossing.
     detail_m
-        How finely the way through the region follows its middle.
+        How finely the way through the region follows its middle, at first.
 
     Raises
     ------
@@ -123,10 +127,16 @@ def joined(
         allowed = [_corridor(leg, water, opening_m) for leg in (launch, recovery)]
         for path in _candidates(region, launch, recovery, waters[0], opening_m, detail_m):
             legs = path.difference(free)
-            if path.is_simple and legs.difference(shapely.union_all(allowed)).length < ROUNDING_M:
+            if _is_plainly_simple(path) and legs.difference(shapely.union_all(allowed)).length < ROUNDING_M:
                 return path
-        opening_m /= 2
+        # Another detail makes another triangulation, whose way may keep clear of what this one touched.
+        opening_m, detail_m = opening_m / 2, detail_m * OTHER_DETAIL
     raise Internal(f"the legs from {launch.place} and to {recovery.place} do not fit the ring", "legs")
+
+
+def _is_plainly_simple(path: LineString) -> bool:
+    """Simple, and not by rounding alone: still so when turned."""
+    return bool(path.is_simple and rotate(path, 1.0, use_radians=True).is_simple)
 
 
 def _corridor(leg: Access, water: BaseGeometry, width_m: float) -> BaseGeometry:

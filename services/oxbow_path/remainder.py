@@ -10,7 +10,7 @@ from shapely.ops import substring
 from oxbow.contracts import FloatArray
 from oxbow_path.gaps import branch_to
 from oxbow_path.spacing import Budget
-from oxbow_path.transect import Trial, Waters, finished
+from oxbow_path.transect import Trial, Waters, finished, touches_entries
 from oxbow_path.walk import Brush, Walk, largest, simply_connected
 
 __all__ = ["with_remainder"]
@@ -42,15 +42,15 @@ def _with_spur(trial: Trial, waters: Waters, left_m: float) -> Trial | None:
     """The trial with a spur towards its worst gap, as long as fits; None if none does."""
     distance = waters.probe.distances(trial.path)
     gap, depth_m = waters.probe.points[np.argmax(distance)], float(distance.max())
-    spur = _spur(trial, waters, gap)
+    spur = _end(_spur(trial, waters, gap), left_m / 2)
     for _ in range(SHORTENINGS):
-        spur = _end(spur, left_m / 2)
         longer = _grown(trial, waters, spur)
-        if 0.0 < longer.length_m - trial.length_m <= left_m and (
-            waters.probe.distances(longer.path).max() <= depth_m
-        ):
+        if longer is None:
+            return None
+        growth_m = longer.length_m - trial.length_m
+        if 0.0 < growth_m <= left_m and waters.probe.distances(longer.path).max() <= depth_m:
             return longer
-        left_m /= 2
+        spur = _end(spur, spur.length * (0.95 * left_m / growth_m if growth_m > left_m else 0.5))
     return None
 
 
@@ -59,7 +59,7 @@ def _spur(trial: Trial, waters: Waters, gap: FloatArray) -> LineString:
     region = trial.walk.region
     if shapely.contains_xy(region, *gap):
         return shapely.shortest_line(Point(gap), region.exterior)
-    goals = waters.routes.midpoints_in(region)
+    goals = waters.routes.goals_in(region)
     return branch_to(gap, region, waters.routes, goals, SPUR * waters.spacing_m)
 
 
@@ -69,12 +69,14 @@ def _end(line: LineString, length_m: float) -> LineString:
     return end if isinstance(end, LineString) else line
 
 
-def _grown(trial: Trial, waters: Waters, spur: LineString) -> Trial:
-    """The trial with a spur: a band outside its region, a slit inside."""
+def _grown(trial: Trial, waters: Waters, spur: LineString) -> Trial | None:
+    """The trial with a spur: a band outside its region, a slit inside; None where that parts it from an entry."""
     region, half_width_m = trial.walk.region, SPUR * waters.spacing_m
     if shapely.contains_xy(region, *spur.coords[0]):
         region = largest(region.difference(spur.buffer(half_width_m)))
     else:
         region = largest(region.union(Brush(waters.free, half_width_m, 0.0).bands([spur])))
     walk = simply_connected(region, waters.probe, cut_width_m=trial.pattern.cut_m, reach_m=trial.pattern.reach_m)
+    if not touches_entries(walk.region, waters):
+        return None
     return finished(waters, trial.pattern, trial.circuit, Walk(walk.region, trial.walk.cuts, trial.walk.enclosed))

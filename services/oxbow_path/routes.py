@@ -26,6 +26,12 @@ Indices = npt.NDArray[np.intp]
 
 LEAST_STEP_M = 1e-9
 
+FLAT = 1e-9
+"""A triangle whose height is less than this share of its longest side is flat."""
+
+CHAIN = 16
+"""Flat triangles are followed through chains of up to two to this power."""
+
 TAUT_POINTS = 200
 """Into how many steps a route is divided before it is pulled tight."""
 
@@ -49,22 +55,27 @@ class Routes:
     def _mesh(self) -> _Mesh:
         return _Mesh(self.water, self.detail_m)
 
-    def midpoints_in(self, area: Polygon) -> Indices:
-        """The midpoints inside an area: goals of a route to it."""
+    def goals_in(self, area: Polygon) -> Indices:
+        """The places of the graph inside an area."""
         shapely.prepare(area)
-        return np.flatnonzero(shapely.contains_xy(area, self._mesh.midpoints))
+        return np.flatnonzero(shapely.contains_xy(area, self._mesh.places))
 
-    def route(self, start: Place | FloatArray, goals: Indices) -> LineString | None:
-        """The shortest route over midpoints from a point of the water to a goal; None if none leads there."""
+    def to_area(self, start: FloatArray, area: Polygon, goals: Indices) -> LineString | None:
+        """The shortest route from a point of the water into an area; None if none leads there.
+
+        `goals` are the area's `goals_in`; an area too small to hold any is entered at a point of its own.
+        """
+        if len(goals) == 0:
+            return LineString(self.between(start, shapely.get_coordinates(area.representative_point())[0]))
         way = self._way(start, goals)
         return None if way is None else LineString(np.vstack([start, way]))
 
     def between(self, start: FloatArray, goal: FloatArray) -> FloatArray:
         """The shortest route over midpoints between two points of the water, shape (n, 2), both included."""
         mesh = self._mesh
-        if mesh.triangle_at(start) == mesh.triangle_at(goal):
+        if mesh.face_at(start) == mesh.face_at(goal):
             return np.vstack([start, goal])
-        way = self._way(start, mesh.edges_at(goal))
+        way = self._way(start, mesh.gates_at(goal))
         if way is None:
             raise Internal(f"no way inside the region from {start} to {goal}", "routes")
         return np.vstack([start, way, goal])
@@ -72,7 +83,7 @@ class Routes:
     def _way(self, start: Place | FloatArray, goals: Indices) -> FloatArray | None:
         """Midpoints from one of the edges at `start` to the nearest goal."""
         mesh = self._mesh
-        sources = mesh.edges_at(start)
+        sources = mesh.gates_at(start)
         if len(sources) == 0 or len(goals) == 0:
             return None
         distance, previous, _ = dijkstra(mesh.graph, indices=sources, return_predecessors=True, min_only=True)
@@ -82,44 +93,81 @@ class Routes:
         nodes = [node]
         while previous[nodes[-1]] >= 0:
             nodes.append(int(previous[nodes[-1]]))
-        return mesh.midpoints[nodes[::-1]]
+        return mesh.places[nodes[::-1]]
 
 
 class _Mesh:
-    """The triangulation's inner edges: their midpoints, and the graph over them."""
+    """The triangulation as convex faces, and the graph over the midpoints of the gates between them."""
 
     def __init__(self, water: Polygon, detail_m: float) -> None:
         shore = shapely.segmentize(water, detail_m)
         self.triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shore))
+        self.index = shapely.STRtree(self.triangles)
         corners = shapely.get_coordinates(self.triangles).reshape(-1, 4, 2)[:, :3]
         vertices, index = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
-        index = index.reshape(-1, 3)
-        sides = np.sort(index[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
-        edges, side_edge, count = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True)
-        inner = count == 2
-        number = np.cumsum(inner) - 1
-        self.side_edge = np.where(inner[side_edge], number[side_edge], -1).reshape(-1, 3)
-        self.midpoints: FloatArray = vertices[edges[inner]].mean(axis=1)
+        sides = np.sort(index.reshape(-1, 3)[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
+        order = np.lexsort(sides.T)
+        first = np.flatnonzero((sides[order[1:]] == sides[order[:-1]]).all(axis=1))
+        pairs = np.column_stack([order[first], order[first + 1]])
+        self.face = _faces(corners, pairs)
+        between = self.face[pairs // 3]
+        gates = between[:, 0] != between[:, 1]
+        midpoints = vertices[sides[pairs[gates, 0]]].mean(axis=1)
+        self.places: FloatArray = np.vstack([midpoints, corners.mean(axis=1)])
+        by_face = np.argsort(between[gates].ravel(), kind="stable")
+        self.owner = between[gates].ravel()[by_face]
+        self.gate = by_face // 2
         self.graph = self._graph()
-        self.index = shapely.STRtree(self.triangles)
 
     def _graph(self) -> csr_array[np.float64]:
-        pairs = self.side_edge[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-        a, b = pairs[(pairs >= 0).all(axis=1)].T
-        # A sparse sum drops zeros, and two edges of a flat triangle may share their midpoint.
-        weight = np.hypot(*(self.midpoints[a] - self.midpoints[b]).T) + LEAST_STEP_M
-        n = len(self.midpoints)
+        """Gates of one triangle see each other; those of a merged face, which may lie in line, meet at its centre."""
+        merged = np.bincount(self.face, minlength=len(self.face))[self.owner] > 1
+        pairs = [np.column_stack([self.gate, len(self.places) - len(self.face) + self.owner])[merged]]
+        for k in (1, 2):
+            same = (self.owner[:-k] == self.owner[k:]) & ~merged[k:]
+            pairs.append(np.column_stack([self.gate[:-k], self.gate[k:]])[same])
+        a, b = np.vstack(pairs).T
+        # A sparse sum drops zeros.
+        weight = np.hypot(*(self.places[a] - self.places[b]).T) + LEAST_STEP_M
+        n = len(self.places)
         one_way = csr_array((weight, (a, b)), shape=(n, n))
         return csr_array(one_way + one_way.T)
 
-    def triangle_at(self, place: Place | FloatArray) -> int:
-        """The triangle that holds a place, or is nearest to it."""
-        return int(np.atleast_1d(self.index.query_nearest(Point(place), all_matches=False))[0])
+    def face_at(self, place: Place | FloatArray) -> int:
+        """The face that holds a place, or is nearest to it."""
+        return int(self.face[np.atleast_1d(self.index.query_nearest(Point(place), all_matches=False))[0]])
 
-    def edges_at(self, place: Place | FloatArray) -> Indices:
-        """The inner edges of the triangle at a place."""
-        sides = self.side_edge[self.triangle_at(place)]
-        return np.asarray(sides[sides >= 0])
+    def gates_at(self, place: Place | FloatArray) -> Indices:
+        """The gates of the face at a place."""
+        first, last = np.searchsorted(self.owner, [self.face_at(place), self.face_at(place) + 1])
+        return np.asarray(self.gate[first:last])
+
+
+def _faces(corners: FloatArray, pairs: Indices) -> Indices:
+    """The number of the face of each triangle: a flat triangle belongs to the one beyond its longest side.
+
+    Vertices in line make flat triangles, and the middle of the longest side of one may be a vertex: no gate to
+    lead a path through.
+
+    Parameters
+    ----------
+    corners : ndarray, shape (n, 3, 2)
+        The triangles.
+    pairs : ndarray, shape (m, 2)
+        Sides that coincide; side k of triangle t has the number 3 t + k.
+    """
+    length = np.hypot(*np.moveaxis(np.roll(corners, -1, axis=1) - corners, 2, 0))
+    longest = length.argmax(axis=1)
+    spread = corners[:, 1:] - corners[:, :1]
+    area = np.abs(spread[:, 0, 0] * spread[:, 1, 1] - spread[:, 0, 1] * spread[:, 1, 0])
+    flat = area <= FLAT * length.max(axis=1) ** 2
+    partner = np.full(3 * len(corners), -1)
+    partner[pairs[:, 0]], partner[pairs[:, 1]] = pairs[:, 1], pairs[:, 0]
+    beyond = partner[3 * np.arange(len(corners)) + longest] // 3
+    face = np.where(flat & (beyond >= 0), beyond, np.arange(len(corners)))
+    for _ in range(CHAIN):
+        face = face[face]
+    return np.asarray(face)
 
 
 def taut(route: LineString, water: BaseGeometry) -> LineString:

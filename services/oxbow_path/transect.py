@@ -18,7 +18,7 @@ from oxbow_path.routes import Routes
 from oxbow_path.transects import place_transects
 from oxbow_path.walk import Brush, Walk, dilated, largest, simply_connected
 
-__all__ = ["Pattern", "Trial", "Waters", "finished", "try_pattern"]
+__all__ = ["Pattern", "Trial", "Waters", "finished", "touches_entries", "try_pattern"]
 
 LEAST_TRANSECT = 2.0
 """In spacings. Where the water is narrower, out and back along its middle is shorter than transects across."""
@@ -126,7 +126,7 @@ def try_pattern(waters: Waters, pattern: Pattern) -> Trial:
     walk = reach_gaps(walk, brush, waters.probe, waters.routes, reach_m=pattern.reach_m, cut_width_m=pattern.cut_m)
     region = _straightened(walk.region, waters, STRAIGHTENING * pattern.spacing_m)
     region = connected(_accessible(region, waters, brush)).region
-    if not _touches_all(region, waters):
+    if not touches_entries(region, waters):
         region = Polygon(_accessible(region, waters, brush).exterior)
     return finished(waters, pattern, circuit, Walk(region, walk.cuts, walk.enclosed))
 
@@ -163,12 +163,13 @@ def _accessible(region: Polygon, waters: Waters, brush: Brush) -> Polygon:
     """The region grown to the launch and recovery points' entries."""
     for entry in waters.entries:
         if not shapely.dwithin(region, entry, ROUNDING_M):
-            goals = waters.routes.midpoints_in(region)
+            goals = waters.routes.goals_in(region)
             place = shapely.get_coordinates(entry)[0]
             branch = branch_to(place, region, waters.routes, goals, brush.half_width_m)
             region = largest(region.union(brush.bands([branch])))
     return region
 
 
-def _touches_all(region: Polygon, waters: Waters) -> bool:
+def touches_entries(region: Polygon, waters: Waters) -> bool:
+    """Whether the legs can join the region where they end."""
     return all(shapely.dwithin(region, entry, ROUNDING_M) for entry in waters.entries)
