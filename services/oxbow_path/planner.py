@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 import shapely
+from shapely import Point
 
 from oxbow.contracts import PathRequest
 from oxbow.errors import Infeasible
@@ -111,8 +112,21 @@ def _score(trial: Trial, waters: Waters, budget: Budget) -> float:
     return float(distance.max() + np.quantile(distance, 0.95)) * (1.0 + unused)
 
 
+def _require_connected(request: PathRequest) -> None:
+    """A point in water that is not connected to the free space cannot be reached at the safety distance."""
+    for where, place in (("LaunchPoint", request.launch), ("RecoveryPoint", request.recovery)):
+        for part in request.space.dropped:
+            if part.outline.covers(Point(place)):
+                raise Infeasible(
+                    f"lies in {part.area_m2:.0f} m2 of water that is left out ({part.reason}); move it into the"
+                    " largest part, or choose a smaller Safety",
+                    where,
+                )
+
+
 def _waters(request: PathRequest, spacing_m: float) -> Waters:
     """Turn the request into the sweep frame, and prepare what all trials share."""
+    _require_connected(request)
     turn = partial(to_sweep, heading_rad=request.decomposition.heading_rad)
     free, water = (shapely.transform(polygon, turn) for polygon in (request.space.free, request.space.water))
     shapely.prepare([free, water])

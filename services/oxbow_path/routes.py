@@ -29,8 +29,8 @@ LEAST_STEP_M = 1e-9
 FLAT = 1e-9
 """A triangle whose height is less than this share of its longest side is flat."""
 
-CHAIN = 16
-"""Flat triangles are followed through chains of up to two to this power."""
+IN_LINE_M = 1e-6
+"""Sides nearer to each other than this run along each other."""
 
 TAUT_POINTS = 200
 """Into how many steps a route is divided before it is pulled tight."""
@@ -73,7 +73,7 @@ class Routes:
     def between(self, start: FloatArray, goal: FloatArray) -> FloatArray:
         """The shortest route over midpoints between two points of the water, shape (n, 2), both included."""
         mesh = self._mesh
-        if mesh.face_at(start) == mesh.face_at(goal):
+        if mesh.triangle_at(start) == mesh.triangle_at(goal):
             return np.vstack([start, goal])
         way = self._way(start, mesh.gates_at(goal))
         if way is None:
@@ -97,34 +97,26 @@ class Routes:
 
 
 class _Mesh:
-    """The triangulation as convex faces, and the graph over the midpoints of the gates between them."""
+    """The triangulation, and the graph over the midpoints of the gates between its triangles."""
 
     def __init__(self, water: Polygon, detail_m: float) -> None:
         shore = shapely.segmentize(water, detail_m)
-        self.triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shore))
-        self.index = shapely.STRtree(self.triangles)
-        corners = shapely.get_coordinates(self.triangles).reshape(-1, 4, 2)[:, :3]
-        vertices, index = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
-        sides = np.sort(index.reshape(-1, 3)[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
-        order = np.lexsort(sides.T)
-        first = np.flatnonzero((sides[order[1:]] == sides[order[:-1]]).all(axis=1))
-        pairs = np.column_stack([order[first], order[first + 1]])
-        self.face = _faces(corners, pairs)
-        between = self.face[pairs // 3]
-        gates = between[:, 0] != between[:, 1]
-        midpoints = vertices[sides[pairs[gates, 0]]].mean(axis=1)
-        self.places: FloatArray = np.vstack([midpoints, corners.mean(axis=1)])
-        by_face = np.argsort(between[gates].ravel(), kind="stable")
-        self.owner = between[gates].ravel()[by_face]
-        self.gate = by_face // 2
-        self.graph = self._graph()
+        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shore))
+        corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+        thick = ~_flat(corners)
+        self.index = shapely.STRtree(triangles[thick])
+        midpoints, owners, whole = _gates(corners, thick)
+        self.places: FloatArray = np.vstack([midpoints, corners[thick].mean(axis=1)])
+        by_owner = np.argsort(owners.ravel(), kind="stable")
+        self.owner, self.gate = owners.ravel()[by_owner], by_owner // 2
+        self.graph = self._graph(len(midpoints), whole)
 
-    def _graph(self) -> csr_array[np.float64]:
-        """Gates of one triangle see each other; those of a merged face, which may lie in line, meet at its centre."""
-        merged = np.bincount(self.face, minlength=len(self.face))[self.owner] > 1
-        pairs = [np.column_stack([self.gate, len(self.places) - len(self.face) + self.owner])[merged]]
+    def _graph(self, gates: int, whole: int) -> csr_array[np.float64]:
+        """Gates of one triangle see each other; where some are parts of a side, all see its centre instead."""
+        crowded = np.isin(self.owner, self.owner[self.gate >= whole])
+        pairs = [np.column_stack([self.gate, gates + self.owner])[crowded]]
         for k in (1, 2):
-            same = (self.owner[:-k] == self.owner[k:]) & ~merged[k:]
+            same = (self.owner[:-k] == self.owner[k:]) & ~crowded[k:]
             pairs.append(np.column_stack([self.gate[:-k], self.gate[k:]])[same])
         a, b = np.vstack(pairs).T
         # A sparse sum drops zeros.
@@ -133,41 +125,59 @@ class _Mesh:
         one_way = csr_array((weight, (a, b)), shape=(n, n))
         return csr_array(one_way + one_way.T)
 
-    def face_at(self, place: Place | FloatArray) -> int:
-        """The face that holds a place, or is nearest to it."""
-        return int(self.face[np.atleast_1d(self.index.query_nearest(Point(place), all_matches=False))[0]])
+    def triangle_at(self, place: Place | FloatArray) -> int:
+        """The triangle that holds a place, or is nearest to it."""
+        return int(np.atleast_1d(self.index.query_nearest(Point(place), all_matches=False))[0])
 
     def gates_at(self, place: Place | FloatArray) -> Indices:
-        """The gates of the face at a place."""
-        first, last = np.searchsorted(self.owner, [self.face_at(place), self.face_at(place) + 1])
+        """The gates of the triangle at a place."""
+        triangle = self.triangle_at(place)
+        first, last = np.searchsorted(self.owner, [triangle, triangle + 1])
         return np.asarray(self.gate[first:last])
 
 
-def _faces(corners: FloatArray, pairs: Indices) -> Indices:
-    """The number of the face of each triangle: a flat triangle belongs to the one beyond its longest side.
-
-    Vertices in line make flat triangles, and the middle of the longest side of one may be a vertex: no gate to
-    lead a path through.
-
-    Parameters
-    ----------
-    corners : ndarray, shape (n, 3, 2)
-        The triangles.
-    pairs : ndarray, shape (m, 2)
-        Sides that coincide; side k of triangle t has the number 3 t + k.
-    """
-    length = np.hypot(*np.moveaxis(np.roll(corners, -1, axis=1) - corners, 2, 0))
-    longest = length.argmax(axis=1)
+def _flat(corners: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which triangles, shape (n, 3, 2), have no height: vertices in line make such."""
     spread = corners[:, 1:] - corners[:, :1]
     area = np.abs(spread[:, 0, 0] * spread[:, 1, 1] - spread[:, 0, 1] * spread[:, 1, 0])
-    flat = area <= FLAT * length.max(axis=1) ** 2
-    partner = np.full(3 * len(corners), -1)
-    partner[pairs[:, 0]], partner[pairs[:, 1]] = pairs[:, 1], pairs[:, 0]
-    beyond = partner[3 * np.arange(len(corners)) + longest] // 3
-    face = np.where(flat & (beyond >= 0), beyond, np.arange(len(corners)))
-    for _ in range(CHAIN):
-        face = face[face]
-    return np.asarray(face)
+    longest = np.hypot(*np.moveaxis(np.roll(corners, -1, axis=1) - corners, 2, 0)).max(axis=1)
+    return np.asarray(area <= FLAT * longest**2)
+
+
+def _gates(corners: FloatArray, thick: npt.NDArray[np.bool_]) -> tuple[FloatArray, Indices, int]:
+    """Midpoints of what two thick triangles share, shape (n, 2), and the two triangles of each, among the thick.
+
+    Most share whole sides: so many come first. Sides with a flat triangle between them share a stretch.
+    """
+    vertices, index = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
+    sides = np.sort(index.reshape(-1, 3)[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
+    order = np.lexsort(sides.T)
+    first = np.flatnonzero((sides[order[1:]] == sides[order[:-1]]).all(axis=1))
+    pairs = np.column_stack([order[first], order[first + 1]])
+    both = thick[pairs // 3]
+    whole = pairs[both.all(axis=1)]
+    at_flat = pairs[both][~np.repeat(both.all(axis=1), both.sum(axis=1))]
+    partly, middles = _stretches(vertices[sides[at_flat]])
+    number = np.cumsum(thick) - 1
+    owners = number[np.vstack([whole, at_flat[partly]]) // 3]
+    return np.vstack([vertices[sides[whole[:, 0]]].mean(axis=1), middles]), owners, len(whole)
+
+
+def _stretches(sides: FloatArray) -> tuple[Indices, FloatArray]:
+    """Pairs of sides, shape (n, 2, 2), that run along each other, and the middles of the stretches they share."""
+    lines = np.asarray(shapely.linestrings(sides))
+    a, b = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=IN_LINE_M)
+    a, b = a[a < b], b[a < b]
+    origin, along = sides[a, 0], sides[a, 1] - sides[a, 0]
+    length = np.hypot(*along.T)
+    along = along / length[:, None]
+    ends = np.einsum("nij,nj->ni", sides[b] - origin[:, None], along)
+    start, end = np.maximum(ends.min(axis=1), 0.0), np.minimum(ends.max(axis=1), length)
+    middle = origin + along * ((start + end) / 2)[:, None]
+    across = np.column_stack([-along[:, 1], along[:, 0]])
+    off = np.abs(np.einsum("nij,nj->ni", sides[b] - origin[:, None], across)).max(axis=1)
+    shared = (end - start > IN_LINE_M) & (off <= IN_LINE_M)
+    return np.column_stack([a, b])[shared], middle[shared]
 
 
 def taut(route: LineString, water: BaseGeometry) -> LineString:

@@ -26,6 +26,9 @@ __all__ = ["Brush", "Walk", "dilated", "largest", "simply_connected"]
 CORE = 0.5
 """Half width of a band in narrows, as a share of its half width in the open."""
 
+LEAST_LINE_M = 1e-9
+"""Shorter lines have no direction to be dilated across."""
+
 NARROWINGS = 8
 AREA_TOLERANCE = 1e-6
 
@@ -70,6 +73,7 @@ class Brush:
 
     def bands(self, lines: Sequence[LineString], *, flat: bool = False) -> BaseGeometry:
         """The bands of some lines; with flat ends they end where the lines end."""
+        lines = [line for line in lines if line.length > LEAST_LINE_M]
         wide, core = (
             shapely.union_all(
                 shapely.buffer(
