@@ -22,7 +22,7 @@ from oxbow.errors import Infeasible, Internal
 from oxbow_path.routes import Routes, taut
 from oxbow_path.walk import largest
 
-__all__ = ["ROUNDING_M", "Access", "access", "joined"]
+__all__ = ["ROUNDING_M", "Access", "access", "is_plainly_simple", "joined"]
 
 ROUNDING_M = 1e-6
 """Places nearer to each other than this are one."""
@@ -127,14 +127,14 @@ def joined(
         allowed = [_corridor(leg, water, opening_m) for leg in (launch, recovery)]
         for path in _candidates(region, launch, recovery, waters[0], opening_m, detail_m):
             legs = path.difference(free)
-            if _is_plainly_simple(path) and legs.difference(shapely.union_all(allowed)).length < ROUNDING_M:
+            if is_plainly_simple(path) and legs.difference(shapely.union_all(allowed)).length < ROUNDING_M:
                 return path
         # Another detail makes another triangulation, whose way may keep clear of what this one touched.
         opening_m, detail_m = opening_m / 2, detail_m * OTHER_DETAIL
     raise Internal(f"the legs from {launch.place} and to {recovery.place} do not fit the ring", "legs")
 
 
-def _is_plainly_simple(path: LineString) -> bool:
+def is_plainly_simple(path: LineString) -> bool:
     """Simple, and not by rounding alone: still so when turned."""
     return bool(path.is_simple and rotate(path, 1.0, use_radians=True).is_simple)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -13,6 +14,7 @@ from oxbow.recording import Show
 from oxbow.sweep import from_sweep
 from oxbow_path.conformance import require_conforming
 from oxbow_path.dropped import dropped_parts
+from oxbow_path.legs import Access
 from oxbow_path.planner import ACCEPTED, TransectPlan, plan_transects
 from oxbow_path.show import show_plan
 
@@ -46,11 +48,26 @@ def _from_launch_to_recovery(path: LineString, request: PathRequest) -> LineStri
 
 
 def _warnings(plan: TransectPlan, request: PathRequest) -> tuple[str, ...]:
+    legs = {"LaunchPoint": plan.waters.launch, "RecoveryPoint": plan.waters.recovery}
+    return (*_leg_warnings(legs), *_length_warnings(plan, request))
+
+
+def _leg_warnings(legs: dict[str, Access]) -> Iterator[str]:
+    for where, leg in legs.items():
+        if leg.ashore:
+            yield f"{where} lies ashore: its leg of {leg.line.length:.0f} m begins over land"
+        elif len(leg.leg) > 2:
+            yield (
+                f"{where} is out of sight of the free space: its leg leads {leg.line.length:.0f} m"
+                " through water nearer to the shore than Safety"
+            )
+
+
+def _length_warnings(plan: TransectPlan, request: PathRequest) -> Iterator[str]:
     share = plan.chosen.length_m / request.length_m
-    if share >= ACCEPTED:
-        return ()
-    if plan.chosen.pattern.spacing_m <= request.min_spacing_m:
-        reason = f"Minimal_spatial_rate keeps the spacing at {request.min_spacing_m:g} m"
-    else:
-        reason = "no spacing between those tried fits better"
-    return (f"the path uses {share:.1%} of the longest length: {reason}",)
+    if share < ACCEPTED:
+        if plan.chosen.pattern.spacing_m <= request.min_spacing_m:
+            reason = f"Minimal_spatial_rate keeps the spacing at {request.min_spacing_m:g} m"
+        else:
+            reason = "no spacing between those tried fits better"
+        yield f"the path uses {share:.1%} of the longest length: {reason}"

@@ -12,7 +12,7 @@ from shapely import LineString, Point, Polygon
 from oxbow.contracts import Cell
 from oxbow_path.circuit import Circuit, plan_circuit
 from oxbow_path.gaps import branch_to, reach_gaps
-from oxbow_path.legs import ROUNDING_M, Access, joined
+from oxbow_path.legs import ROUNDING_M, Access, is_plainly_simple, joined
 from oxbow_path.probe import Probe
 from oxbow_path.routes import Routes
 from oxbow_path.transects import place_transects
@@ -132,7 +132,12 @@ def try_pattern(waters: Waters, pattern: Pattern) -> Trial:
 
 
 def finished(waters: Waters, pattern: Pattern, circuit: Circuit, walk: Walk) -> Trial:
-    """A walk that touches both entries, with its legs."""
+    """A walk that touches both entries, with its legs; smoothed first where its ring all but touches itself."""
+    if not is_plainly_simple(LineString(walk.region.exterior)):
+        width_m = STRAIGHTENING * pattern.spacing_m
+        smooth = walk.region.buffer(width_m).buffer(-2 * width_m).buffer(width_m).intersection(waters.free)
+        region = _accessible(Polygon(largest(smooth).exterior), waters, Brush(waters.free, width_m, 0.0))
+        walk = Walk(Polygon(region.exterior), walk.cuts, walk.enclosed)
     path = joined(
         walk.region,
         waters.launch,

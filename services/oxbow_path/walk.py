@@ -29,6 +29,9 @@ CORE = 0.5
 LEAST_LINE_M = 1e-9
 """Shorter lines have no direction to be dilated across."""
 
+MITRE = 1.5
+"""Corners of bands are sharp up to this ratio, for few waypoints."""
+
 NARROWINGS = 8
 AREA_TOLERANCE = 1e-6
 
@@ -73,20 +76,25 @@ class Brush:
 
     def bands(self, lines: Sequence[LineString], *, flat: bool = False) -> BaseGeometry:
         """The bands of some lines; with flat ends they end where the lines end."""
-        lines = [line for line in lines if line.length > LEAST_LINE_M]
         wide, core = (
-            shapely.union_all(
-                shapely.buffer(
-                    np.asarray(lines),
-                    width_m,
-                    cap_style="flat" if flat else "square",
-                    join_style="mitre",
-                    mitre_limit=1.5,
-                )
-            )
+            shapely.union_all(_dilations(lines, width_m, flat=flat))
             for width_m in (self.half_width_m, CORE * self.half_width_m)
         )
         return wide.intersection(self._roomy).union(core.intersection(self.free))
+
+
+def _dilations(lines: Sequence[LineString], width_m: float, *, flat: bool) -> list[BaseGeometry]:
+    directed = [line for line in lines if line.length > LEAST_LINE_M]
+    # GEOS raises the flags of a division by zero where it mitres parallel segments, and then copes with it.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        dilations = shapely.buffer(
+            directed,
+            width_m,
+            cap_style="flat" if flat else "square",
+            join_style="mitre",
+            mitre_limit=MITRE,
+        )
+    return list(dilations)
 
 
 def dilated(circuit: Circuit, brush: Brush) -> Polygon:
