@@ -37,7 +37,7 @@ imports: $(READY)
 pytest: $(READY)
 	$(BIN)/python -m pytest
 
-bench: $(READY) ## Measure planning, the bus and the stack; results in out/bench/.
+bench: $(READY) ## Measure planning, the bus and the stack; results in out/bench.json.
 	$(BIN)/python tests/bench/run.py
 
 lock: ## Renew requirements.lock: the newest versions that pyproject.toml accepts.

@@ -1,0 +1,89 @@
+"""Planning time by stage, in one process, against the size of the problem."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from bounded import Bounded
+from lakes import lake
+from results import Figure, Section
+
+from oxbow.contracts import STAGES, Endpoint, Message
+from oxbow.mission import Mission, mission_json, parse_mission
+from oxbow.pipeline import Call, plan_mission
+from oxbow_cli.local import local_call
+
+__all__ = ["TimedCall", "measure"]
+
+Q = TypeVar("Q", bound=Message)
+R = TypeVar("R", bound=Message)
+
+LIMIT_S = 60.0
+"""Of one plan; those that take longer are stopped."""
+
+VERTICES = (1_000, 10_000, 100_000, 1_000_000)
+ISLANDS = (1, 10, 100, 1_000)
+SPACINGS = (5.0, 10.0, 20.0, 40.0, 80.0)
+
+
+@dataclass
+class TimedCall:
+    """A call that notes the seconds of each stage."""
+
+    call: Call
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /) -> R:
+        started = time.perf_counter()
+        try:
+            return self.call(endpoint, request)
+        finally:
+            self.seconds[endpoint.stage] = time.perf_counter() - started
+
+
+def measure() -> Iterator[Section]:
+    """Three tables: against vertices, islands and waypoints."""
+    with Bounded() as bounded:
+        yield Section(
+            "Planning time by stage, s: vertices (no islands, 40 spacings across)",
+            [_row(bounded, {"vertices": n}, n, 0, 40.0) for n in VERTICES],
+            note="`edges`: reading the file, checking the site, completing and writing the file",
+        )
+        yield Section(
+            "Planning time by stage, s: islands (10 000 vertices, 40 spacings across)",
+            [_row(bounded, {"islands": k}, 10_000, k, 40.0) for k in ISLANDS],
+        )
+        yield Section(
+            "Planning time by stage, s: waypoints (1 000 vertices, 4 islands)",
+            [_row(bounded, {"spacings": s}, 1_000, 4, s) for s in SPACINGS],
+        )
+
+
+def _row(
+    bounded: Bounded, size: dict[str, Figure], vertices: int, islands: int, spacings: float
+) -> dict[str, Figure]:
+    columns = ["waypoints", "edges", *(endpoint.stage for endpoint in STAGES), "total", "q"]
+    try:
+        return size | bounded.run(LIMIT_S, _timed_plan, lake(vertices, islands, spacings=spacings))
+    except TimeoutError:
+        return size | dict.fromkeys(columns, "") | {"total": f"> {LIMIT_S:g}"}
+
+
+def _timed_plan(mission: Mission) -> dict[str, Figure]:
+    call = TimedCall(local_call())
+    document = mission_json(mission)
+    started = time.perf_counter()
+    planned = plan_mission(parse_mission(document), call=call)
+    mission_json(planned)
+    total_s = time.perf_counter() - started
+    assert planned.plan is not None
+    return {
+        "waypoints": len(planned.master_path or ()),
+        "edges": total_s - sum(call.seconds.values()),
+        **call.seconds,
+        "total": total_s,
+        "q": planned.plan.certificate.q,
+    }
