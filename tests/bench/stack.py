@@ -65,14 +65,16 @@ def running_stack(replicas: int = 1) -> Iterator[Stack]:
             text=True,
         )
         late = threading.Timer(START_LIMIT_S, process.kill)
+        late.daemon = True
         late.start()
         try:
             assert process.stdout is not None
-            if not process.stdout.readline().startswith("ready"):
+            is_ready = process.stdout.readline().startswith("ready")
+            late.cancel()
+            if not is_ready:
                 raise RuntimeError(f"the stack did not start:\n{(Path(home) / 'log').read_text()}")
             yield Stack(endpoint, process, started)
         finally:
-            late.cancel()
             process.terminate()
             process.wait(LIMIT_S)
             if process.stdout is not None:
