@@ -43,7 +43,7 @@ def reach_gaps(
         branches = list(_branches(gaps[~inside], walk.region, brush, routes, apart_m))
         grown = walk.region.union(brush.bands(branches))
         region = largest(grown.difference(shapely.union_all(slits)))
-        walk = simply_connected(region, probe, cut_width_m=cut_width_m, reach_m=reach_m)
+        walk = simply_connected(region, brush.free, probe, cut_width_m=cut_width_m, reach_m=reach_m)
     return walk
 
 

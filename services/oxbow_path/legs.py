@@ -117,6 +117,8 @@ def joined(
 
     Raises
     ------
+    Infeasible
+        The water that a leg has to pass is as good as closed.
     Internal
         No opening gives a simple path: a fault of the construction.
     """
@@ -131,6 +133,8 @@ def joined(
                 return path
         # Another detail makes another triangulation, whose way may keep clear of what this one touched.
         opening_m, detail_m = opening_m / 2, detail_m * OTHER_DETAIL
+    if any(len(leg.leg) > 2 for leg in (launch, recovery)):
+        raise Infeasible("is reached only by water too narrow to come back beside the way out", "LaunchPoint")
     raise Internal(f"the legs from {launch.place} and to {recovery.place} do not fit the ring", "legs")
 
 

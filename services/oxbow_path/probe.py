@@ -68,5 +68,5 @@ def covered(points: FloatArray, steps: FloatArray, reach_m: float) -> bool:
         return True
     if len(steps) == 0:
         return False
-    distance, _ = cKDTree(steps).query(points, distance_upper_bound=reach_m)
+    distance, _ = cKDTree(steps).query(points, distance_upper_bound=np.nextafter(reach_m, np.inf))
     return bool(np.isfinite(distance).all())

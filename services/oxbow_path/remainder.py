@@ -76,7 +76,9 @@ def _grown(trial: Trial, waters: Waters, spur: LineString) -> Trial | None:
         region = largest(region.difference(spur.buffer(half_width_m)))
     else:
         region = largest(region.union(Brush(waters.free, half_width_m, 0.0).bands([spur])))
-    walk = simply_connected(region, waters.probe, cut_width_m=trial.pattern.cut_m, reach_m=trial.pattern.reach_m)
+    walk = simply_connected(
+        region, waters.free, waters.probe, cut_width_m=trial.pattern.cut_m, reach_m=trial.pattern.reach_m
+    )
     if not touches_entries(walk.region, waters):
         return None
-    return finished(waters, trial.pattern, trial.circuit, Walk(walk.region, trial.walk.cuts, trial.walk.enclosed))
+    return finished(waters, pattern, trial.circuit, Walk(walk.region, trial.walk.cuts, trial.walk.enclosed))

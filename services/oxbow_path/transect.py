@@ -16,7 +16,7 @@ from oxbow_path.legs import ROUNDING_M, Access, is_plainly_simple, joined
 from oxbow_path.probe import Probe
 from oxbow_path.routes import Routes
 from oxbow_path.transects import place_transects
-from oxbow_path.walk import Brush, Walk, dilated, largest, simply_connected
+from oxbow_path.walk import Brush, Walk, clear_of_land, dilated, largest, simply_connected
 
 __all__ = ["Pattern", "Trial", "Waters", "finished", "touches_entries", "try_pattern"]
 
@@ -121,7 +121,9 @@ def try_pattern(waters: Waters, pattern: Pattern) -> Trial:
         inset_m=pattern.half_width_m + pattern.trim_m,
     )
     brush = Brush(waters.free, pattern.half_width_m, pattern.trim_m)
-    connected = partial(simply_connected, probe=waters.probe, cut_width_m=pattern.cut_m, reach_m=pattern.reach_m)
+    connected = partial(
+        simply_connected, free=waters.free, probe=waters.probe, cut_width_m=pattern.cut_m, reach_m=pattern.reach_m
+    )
     walk = connected(_accessible(_started(waters, circuit, brush), waters, brush))
     walk = reach_gaps(walk, brush, waters.probe, waters.routes, reach_m=pattern.reach_m, cut_width_m=pattern.cut_m)
     region = _straightened(walk.region, waters, STRAIGHTENING * pattern.spacing_m)
@@ -135,8 +137,8 @@ def finished(waters: Waters, pattern: Pattern, circuit: Circuit, walk: Walk) -> 
     """A walk that touches both entries, with its legs; smoothed first where its ring all but touches itself."""
     if not is_plainly_simple(LineString(walk.region.exterior)):
         width_m = STRAIGHTENING * pattern.spacing_m
-        smooth = walk.region.buffer(width_m).buffer(-2 * width_m).buffer(width_m).intersection(waters.free)
-        region = _accessible(Polygon(largest(smooth).exterior), waters, Brush(waters.free, width_m, 0.0))
+        smooth = walk.region.buffer(width_m).buffer(-2 * width_m).buffer(width_m)
+        region = _accessible(clear_of_land(smooth, waters.free), waters, Brush(waters.free, width_m, 0.0))
         walk = Walk(Polygon(region.exterior), walk.cuts, walk.enclosed)
     path = joined(
         walk.region,
@@ -161,7 +163,7 @@ def _straightened(region: Polygon, waters: Waters, tolerance_m: float) -> Polygo
     """The region with fewer vertices, still inside the free space, and unchanged near the entries."""
     simple = region.simplify(tolerance_m).intersection(waters.free)
     kept = shapely.union_all([entry.buffer(4 * tolerance_m) for entry in waters.entries])
-    return Polygon(largest(simple.union(region.intersection(kept))).exterior)
+    return clear_of_land(simple.union(region.intersection(kept)), waters.free)
 
 
 def _accessible(region: Polygon, waters: Waters, brush: Brush) -> Polygon:

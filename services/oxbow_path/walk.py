@@ -21,7 +21,7 @@ from oxbow.contracts import FloatArray
 from oxbow_path.circuit import Circuit
 from oxbow_path.probe import Probe, covered
 
-__all__ = ["Brush", "Walk", "dilated", "largest", "simply_connected"]
+__all__ = ["Brush", "Walk", "clear_of_land", "dilated", "largest", "simply_connected"]
 
 CORE = 0.5
 """Half width of a band in narrows, as a share of its half width in the open."""
@@ -102,7 +102,15 @@ def dilated(circuit: Circuit, brush: Brush) -> Polygon:
     return largest(brush.bands(circuit.transects, flat=True).union(brush.bands(circuit.links)))
 
 
-def simply_connected(region: Polygon, probe: Probe, *, cut_width_m: float, reach_m: float) -> Walk:
+def clear_of_land(region: BaseGeometry, free: Polygon) -> Polygon:
+    """The largest part of a region in the free space, with its holes filled: its boundary touches no land.
+
+    What a region encloses may be land, and a cut through it may reach that land; it then follows the shore.
+    """
+    return Polygon(largest(region.intersection(free)).exterior)
+
+
+def simply_connected(region: Polygon, free: Polygon, probe: Probe, *, cut_width_m: float, reach_m: float) -> Walk:
     """Rid a region of its holes.
 
     A hole whose water lies within `reach_m` of the remaining boundary is enclosed: its own ring is not worth
@@ -110,12 +118,12 @@ def simply_connected(region: Polygon, probe: Probe, *, cut_width_m: float, reach
     that the path runs round it too.
     """
     if not region.interiors:
-        return Walk(region)
+        return Walk(clear_of_land(region, free))
     kept, enclosed = _enclose(region, probe, reach_m)
     filled = Polygon(region.exterior, kept)
     cuts = _cuts(filled)
     opened = _open(filled, cuts, cut_width_m) if cuts else filled
-    return Walk(opened, tuple(cuts), tuple(enclosed))
+    return Walk(clear_of_land(opened, free), tuple(cuts), tuple(enclosed))
 
 
 def _enclose(region: Polygon, probe: Probe, reach_m: float) -> tuple[list[LinearRing], list[Polygon]]:

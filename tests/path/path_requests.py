@@ -1,0 +1,60 @@
+"""Requests for the path stage, made by the real stages before it."""
+
+import math
+
+import numpy as np
+import shapely
+from shapely import Polygon
+
+from oxbow.contracts import ContourRequest, DecomposeRequest, PathRequest, Place
+from oxbow.recording import discard
+from oxbow_contour.service import handle as contour
+from oxbow_decomposition.service import handle as decompose
+
+
+def lake(seed: int, *, roughness: float = 0.3, vertices: int = 150, radius_m: float = 1000.0) -> Polygon:
+    """A ragged lake with a few islands."""
+    rng = np.random.default_rng(seed)
+    turn = np.linspace(0, 2 * np.pi, vertices, endpoint=False)
+    radius = np.ones(vertices)
+    for wave in range(1, 10):
+        radius += rng.normal(0, roughness / wave) * np.cos(wave * turn + rng.uniform(0, 2 * np.pi))
+    radius = radius_m * np.clip(radius, 0.25, 2.5)
+    outline = Polygon(np.column_stack([radius * np.cos(turn), radius * np.sin(turn)]))
+    islands = [
+        shapely.Point(*rng.uniform(-0.8, 0.8, 2) * radius_m).buffer(rng.uniform(0.03, 0.15) * radius_m)
+        for _ in range(rng.integers(0, 5))
+    ]
+    inner = [island for island in islands if outline.buffer(-0.02 * radius_m).contains(island)]
+    water = outline.difference(shapely.union_all(inner)) if inner else outline
+    return max(shapely.get_parts(water), key=lambda part: part.area)
+
+
+def request(
+    water: Polygon,
+    *,
+    spacings: float = 15.0,
+    safety: float = 0.01,
+    launch: Place | None = None,
+    recovery: Place | None = None,
+    min_spacing_m: float = 0.0,
+    heading_rad: float | None = None,
+) -> PathRequest:
+    """A request for some water: `spacings` is the length, and `safety` the distance, over the root of the area."""
+    scale_m = math.sqrt(water.area)
+    length_m = spacings * scale_m
+    spacing_m = water.area / length_m
+    launch = launch or water.exterior.coords[0]
+    outline, zones = Polygon(water.exterior), tuple(Polygon(ring) for ring in water.interiors)
+    space = contour(
+        ContourRequest(outline=outline, zones=zones, safety_m=safety * scale_m, spacing_m=spacing_m), discard
+    )
+    cells = decompose(DecomposeRequest(free=space.free, spacing_m=spacing_m, heading_rad=heading_rad), discard)
+    return PathRequest(
+        space=space,
+        decomposition=cells,
+        launch=launch,
+        recovery=recovery or launch,
+        length_m=length_m,
+        min_spacing_m=min_spacing_m,
+    )

@@ -1,0 +1,171 @@
+"""What holds for every path, whatever the water, the length and the launch point."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from path_requests import lake, request
+from shapely import LineString, Point, Polygon, affinity, box
+
+from oxbow.contracts import PathPlan, PathRequest
+from oxbow.errors import Infeasible
+from oxbow.recording import Layer, discard
+from oxbow.testing import nasty_polygons
+from oxbow_path.service import handle
+
+quick = settings(deadline=None, max_examples=8, derandomize=True)
+
+
+def require_sound(plan: PathPlan, asked: PathRequest) -> None:
+    """Simple, from launch to recovery, not too long, and outside the free space only for its legs."""
+    path = plan.path
+    assert path.is_simple
+    assert path.coords[0] == pytest.approx(asked.launch, abs=0)
+    assert path.coords[-1] == pytest.approx(asked.recovery, abs=0)
+    assert path.length <= asked.length_m
+    stray = path.difference(asked.space.free.buffer(1e-6))
+    ends = [Point(asked.launch), Point(asked.recovery)]
+    for part in (line for line in shapely.get_parts(stray) if line.length > 1e-6):
+        assert any(shapely.dwithin(part, end, 1e-6) for end in ends)
+        assert asked.space.water.buffer(1e-6).covers(part)
+
+
+def farthest(plan: PathPlan, asked: PathRequest) -> float:
+    shore = shapely.get_coordinates(shapely.segmentize(asked.space.free, plan.spacing_m / 4))
+    return float(shapely.distance(plan.path, shapely.points(shore)).max())
+
+
+@quick
+@given(seed=st.integers(0, 10_000), spacings=st.floats(10, 25), safety=st.sampled_from([0.0, 0.005, 0.02]))
+def test_out_and_back(seed, spacings, safety):
+    asked = request(lake(seed), spacings=spacings, safety=safety)
+    plan = handle(asked, discard)
+    require_sound(plan, asked)
+    assert plan.path.length >= 0.95 * asked.length_m
+    assert farthest(plan, asked) <= 2.2 * plan.spacing_m
+
+
+@quick
+@given(seed=st.integers(0, 10_000), start=st.integers(0, 149), end=st.integers(0, 149), inside=st.booleans())
+def test_points_apart(seed, start, end, inside):
+    water = lake(seed)
+    corners = [tuple(xy) for xy in shapely.get_coordinates(water.exterior)]
+    launch = water.representative_point().coords[0] if inside else corners[start % len(corners)]
+    asked = request(water, spacings=20, launch=launch, recovery=corners[end % len(corners)])
+    plan = handle(asked, discard)
+    require_sound(plan, asked)
+    assert plan.path.length >= 0.95 * asked.length_m
+
+
+@quick
+@given(seed=st.integers(0, 10_000))
+def test_launch_inside_the_water(seed):
+    water = lake(seed)
+    asked = request(water, launch=water.representative_point().coords[0])
+    require_sound(handle(asked, discard), asked)
+
+
+@pytest.mark.parametrize("name", sorted(nasty_polygons()))
+@pytest.mark.parametrize("spacings", [3.0, 20.0])
+def test_nasty_shapes(name, spacings):
+    water = nasty_polygons()[name]
+    try:
+        asked = request(water, spacings=spacings)
+        plan = handle(asked, discard)
+    except Infeasible as error:
+        assert any(name in str(error) for name in ("Master_length", "Safety", "LaunchPoint"))
+    else:
+        require_sound(plan, asked)
+
+
+@pytest.mark.parametrize("where", ["same", "apart", "inside"])
+@pytest.mark.parametrize("spacings", [2.0, 8.0, 40.0])
+@pytest.mark.parametrize(
+    "water",
+    [
+        Polygon([(0, 0), (1000, 0), (0, 1000)]),
+        box(0, 0, 3000, 60),
+        shapely.union_all([box(0, 0, 1000, 100)] + [box(100 * k, 0, 100 * k + 50, 800) for k in range(10)]),
+        box(0, 0, 1000, 1000).difference(shapely.union_all([box(300, 300, 500, 500), box(500, 500, 700, 700)])),
+    ],
+    ids=["triangle", "strip", "comb", "corner-touching-islands"],
+)
+def test_short_and_long_paths(water, spacings, where):
+    corners = [tuple(xy) for xy in shapely.get_coordinates(water.exterior)]
+    launch = water.representative_point().coords[0] if where == "inside" else corners[1]
+    recovery = launch if where == "same" else corners[len(corners) // 2]
+    asked = request(water, spacings=spacings, launch=launch, recovery=recovery)
+    try:
+        plan = handle(asked, discard)
+    except Infeasible as error:
+        assert f"{asked.length_m:.0f} m" in str(error)
+        assert where != "same"
+    else:
+        require_sound(plan, asked)
+
+
+def test_the_same_request_gives_the_same_path():
+    asked = request(lake(7))
+    assert handle(asked, discard).path == handle(asked, discard).path
+
+
+def test_a_turned_and_moved_site_gives_the_turned_and_moved_path():
+    water, turn = lake(3), 0.7
+    moved = affinity.translate(affinity.rotate(water, -turn, origin=(0, 0), use_radians=True), 5e4, -2e4)
+    here = handle(request(water, heading_rad=0.4), discard)
+    there = handle(request(moved, heading_rad=0.4 + turn), discard)
+    assert there.spacing_m == pytest.approx(here.spacing_m, rel=0.1)
+    assert there.path.length == pytest.approx(here.path.length, rel=0.02)
+
+
+def test_least_spacing_binds_and_is_told():
+    water = lake(2)
+    asked = request(water, spacings=20, min_spacing_m=2.5 * np.sqrt(water.area) / 20)
+    plan = handle(asked, discard)
+    require_sound(plan, asked)
+    assert plan.spacing_m == pytest.approx(asked.min_spacing_m)
+    assert plan.path.length < 0.95 * asked.length_m
+    assert any("Minimal_spatial_rate" in warning for warning in plan.warnings)
+
+
+def test_a_launch_point_ashore_is_told():
+    water = box(0, 0, 1000, 800)
+    asked = request(water, launch=(-50.0, 400.0))
+    plan = handle(asked, discard)
+    assert plan.path.coords[0] == (-50.0, 400.0)
+    assert any("ashore" in warning for warning in plan.warnings)
+
+
+def test_a_launch_point_in_water_that_is_left_out_is_refused():
+    basins = shapely.union_all([box(0, 0, 1000, 1000), box(1000, 495, 1100, 505), box(1100, 300, 1500, 700)])
+    with pytest.raises(Infeasible, match="LaunchPoint"):
+        handle(request(basins, safety=0.02, launch=(1300.0, 500.0)), discard)
+
+
+def test_recovery_beyond_reach_is_refused_with_the_length():
+    strip = box(0, 0, 5000, 60)
+    with pytest.raises(Infeasible, match="Master_length"):
+        handle(request(strip, spacings=2, launch=(0.0, 30.0), recovery=(5000.0, 30.0)), discard)
+
+
+def test_what_is_dropped_is_farther_than_reach():
+    arm = shapely.union_all([box(0, 0, 1000, 1000), box(1000, 495, 1700, 505)])
+    asked = request(arm, spacings=10, safety=0.0)
+    plan = handle(asked, discard)
+    require_sound(plan, asked)
+    for part in plan.dropped:
+        assert part.area_m2 == pytest.approx(part.outline.area)
+        assert part.outline.distance(plan.path) > 0.45 * plan.spacing_m
+        assert "m from the path" in part.reason
+
+
+def test_every_step_is_shown():
+    layers: list[Layer] = []
+    asked = request(lake(1))
+    plan = handle(asked, layers.append)
+    by_name = {layer.name: layer for layer in layers}
+    assert {"iterations", "loop", "transects", "circuit", "path"} <= by_name.keys()
+    assert len([layer for layer in layers if layer.name == "iterations"]) == len(plan.steps)
+    assert isinstance(by_name["path"].geometries[0], LineString)
+    assert by_name["path"].geometries[0].hausdorff_distance(plan.path) < 1e-6
