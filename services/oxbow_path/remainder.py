@@ -81,4 +81,4 @@ def _grown(trial: Trial, waters: Waters, spur: LineString) -> Trial | None:
     )
     if not touches_entries(walk.region, waters):
         return None
-    return finished(waters, pattern, trial.circuit, Walk(walk.region, trial.walk.cuts, trial.walk.enclosed))
+    return finished(waters, trial.pattern, trial.circuit, Walk(walk.region, trial.walk.cuts, trial.walk.enclosed))
