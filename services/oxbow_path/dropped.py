@@ -10,7 +10,7 @@ from oxbow.contracts import DroppedPart
 
 __all__ = ["dropped_parts"]
 
-LEAST_SHARE = 0.01
+LEAST_SHARE = 0.1
 """Smaller parts than this share of a square of side `reach_m` are not worth a line."""
 
 

@@ -1,0 +1,145 @@
+"""Make the example missions of this folder; every number is fixed, so that every run gives the same files.
+
+The waters are invented; their places on the map are only there to have degrees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import shapely
+from shapely import LineString, Point, Polygon
+
+from oxbow.contracts import FloatArray
+from oxbow.frame import Frame, Position
+from oxbow.mission import Bloom, Mission, MissionType, write_mission
+
+FOLDER = Path(__file__).parent
+DECIMALS = 6
+"""Of a degree: a tenth of a metre."""
+
+
+def blob(x: float, y: float, radius_m: float, rng: np.random.Generator, roughness: float = 0.25) -> Polygon:
+    """A rounded shape: a circle whose radius varies smoothly with the angle."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
+    order = np.arange(2, 9)
+    weight = roughness * rng.normal(size=7) / order
+    phase = rng.uniform(0.0, 2.0 * np.pi, 7)
+    radius = radius_m * (1.0 + (weight * np.cos(angle[:, None] * order + phase)).sum(axis=1))
+    return Polygon(np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle)]))
+
+
+def channel(points: Sequence[tuple[float, float]], widths_m: Sequence[float]) -> Polygon:
+    """A smooth channel through points, whose width goes from one value to the next."""
+    given = np.linspace(0.0, 1.0, len(points))
+    at = np.linspace(0.0, 1.0, 40 * len(points))
+    nodes = np.asarray(points, dtype=np.float64)
+    window = np.hanning(41) / np.hanning(41).sum()
+    line = np.column_stack(
+        [np.convolve(np.pad(np.interp(at, given, nodes[:, axis]), 20, "edge"), window, "valid") for axis in (0, 1)]
+    )
+    width = np.interp(at, np.linspace(0.0, 1.0, len(widths_m)), widths_m)
+    pieces = shapely.buffer(shapely.linestrings(np.stack([line[:-1], line[1:]], axis=1)), width[1:] / 2.0)
+    merged = shapely.union_all(pieces)
+    assert isinstance(merged, Polygon)
+    return Polygon(merged.exterior)
+
+
+def ragged(shape: Polygon, step_m: float, amplitude_m: float, rng: np.random.Generator) -> Polygon:
+    """The shape with a vertex every `step_m` or so, each moved a little, as surveyed shores are."""
+    shore = LineString(shape.exterior)
+    count = int(shore.length / step_m)
+    xy = shapely.get_coordinates(shapely.line_interpolate_point(shore, np.arange(count) * shore.length / count))
+    moved = Polygon(xy + rng.normal(scale=amplitude_m, size=xy.shape))
+    assert moved.is_valid
+    return moved
+
+
+def positions(frame: Frame, xy: FloatArray) -> tuple[Position, ...]:
+    degrees = np.round(frame.to_degrees(xy), DECIMALS)
+    return tuple(Position(lat=lat, long=long) for long, lat in degrees.tolist())
+
+
+def ring(frame: Frame, shape: Polygon) -> tuple[Position, ...]:
+    return positions(frame, shapely.get_coordinates(shape.exterior)[:-1])
+
+
+def on_shore(frame: Frame, shape: Polygon, x: float, y: float) -> Position:
+    """The vertex of the shore that is nearest to a place."""
+    xy = shapely.get_coordinates(shape.exterior)
+    return positions(frame, xy[[np.argmin(np.hypot(*(xy - (x, y)).T))]])[0]
+
+
+def lake() -> Mission:
+    """A lake with five islands, two bays and a winding arm."""
+    frame, rng = Frame(lat=46.1, long=1.9), np.random.default_rng(11)
+    body = blob(0.0, 0.0, 1150.0, rng)
+    arm = channel(
+        [(600, 500), (1500, 900), (1700, 1700), (2600, 1500), (2900, 2300), (3700, 2300)],
+        [420, 260, 200, 240, 160, 120],
+    )
+    west_bay = channel([(-700, 100), (-1500, 300), (-2000, -200)], [500, 320, 180])
+    south_bay = channel([(200, -700), (500, -1500), (1100, -1750)], [460, 280, 200])
+    shore = ragged(shapely.union_all([body, arm, west_bay, south_bay]), 32.0, 4.0, rng)
+    islands = [(-300, 300, 150), (350, 250, 90), (100, -350, 210), (-560, -380, 60), (1560, 1290, 45)]
+    zones = [ragged(blob(x, y, radius, rng, 0.5), 18.0, 2.0, rng) for x, y, radius in islands]
+    return Mission(
+        mission_type=MissionType.MAP,
+        site_name="Five Islands Lake",
+        launch=on_shore(frame, shore, -300.0, -1300.0),
+        outline=ring(frame, shore),
+        forbidden_zones=tuple(ring(frame, zone) for zone in zones),
+        safety_m=10.0,
+        master_speed_mps=1.5,
+        master_length_m=60_000.0,
+    )
+
+
+def meander() -> Mission:
+    """An oxbow lake: launch at one end, recovery at the other, a bathing place closed off at the shore."""
+    frame, rng = Frame(lat=44.2, long=-0.4), np.random.default_rng(5)
+    bend = [(-900, 900), (-1100, 200), (-800, -600), (0, -950), (800, -600), (1100, 200), (900, 900)]
+    shore = ragged(channel(bend, [120, 180, 240, 260, 230, 190, 140]), 20.0, 1.5, rng)
+    bathing = Point(60.0, -1000.0).buffer(70.0, quad_segs=4)
+    return Mission(
+        mission_type=MissionType.ADAP,
+        site_name="Old Meander",
+        launch=on_shore(frame, shore, -900.0, 1000.0),
+        recovery=on_shore(frame, shore, 900.0, 1000.0),
+        outline=ring(frame, shore),
+        forbidden_zones=(ring(frame, bathing),),
+        bloom=Bloom(sensor="Phycocyanin", value=30.0),
+        safety_m=5.0,
+        master_length_m=15_000.0,
+        minimal_spatial_rate_m=10.0,
+    )
+
+
+def reservoir() -> bytes:
+    """A reservoir in a branched valley, with one island, as GeoJSON."""
+    frame, rng = Frame(lat=43.6, long=2.75), np.random.default_rng(3)
+    valley = channel([(0, 0), (500, 700), (300, 1500), (900, 2300), (800, 3200)], [520, 600, 380, 220, 90])
+    east = channel([(500, 700), (1300, 900), (1900, 1400)], [380, 220, 80])
+    west = channel([(350, 1400), (-400, 1700), (-800, 2300)], [300, 180, 70])
+    shore = ragged(shapely.union_all([valley, east, west]), 30.0, 3.0, rng)
+    island = ragged(blob(430.0, 700.0, 70.0, rng, 0.5), 15.0, 1.5, rng)
+    rings = [[[p.long, p.lat] for p in ring(frame, shape)] for shape in (shore, island)]
+    feature = {
+        "type": "Feature",
+        "properties": {"name": "Three Valleys Reservoir"},
+        "geometry": {"type": "Polygon", "coordinates": [[*points, points[0]] for points in rings]},
+    }
+    return msgspec.json.format(msgspec.json.encode(feature), indent=1) + b"\n"
+
+
+def main() -> None:
+    write_mission(FOLDER / "lake.json", lake())
+    write_mission(FOLDER / "meander.json", meander())
+    (FOLDER / "reservoir.geojson").write_bytes(reservoir())
+
+
+if __name__ == "__main__":
+    main()
