@@ -1,0 +1,82 @@
+"""What an engineer sees first: a tab a stage, the map, and the log with the timings."""
+
+from __future__ import annotations
+
+import rerun.blueprint as rrb
+
+__all__ = ["blueprint"]
+
+
+def blueprint() -> rrb.Blueprint:
+    """The arrangement that every recording carries."""
+    return rrb.Blueprint(
+        rrb.Tabs(
+            _path(),
+            rrb.Spatial2DView(origin="contour", name="Contour"),
+            _decomposition(),
+            _certificate(),
+            rrb.MapView(origin="map", name="Map"),
+            _log(),
+            active_tab=0,
+        ),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed"),
+    )
+
+
+def _path() -> rrb.Horizontal:
+    return rrb.Horizontal(
+        rrb.Spatial2DView(
+            origin="/",
+            name="Path: circuit, transects, cuts, path",
+            contents=[
+                "contour/eroded/**",
+                "path/transects/**",
+                "path/circuit/**",
+                "path/cuts/**",
+                "path/path/**",
+            ],
+        ),
+        rrb.Vertical(
+            rrb.Spatial2DView(
+                origin="/",
+                name="Spacing loop: path per iteration",
+                contents=["contour/eroded/**", "path/iterations/**"],
+            ),
+            rrb.TimeSeriesView(origin="path/loop", name="Spacing and length per iteration"),
+            row_shares=[3, 1],
+        ),
+        column_shares=[3, 2],
+        name="Path",
+    )
+
+
+def _decomposition() -> rrb.Horizontal:
+    return rrb.Horizontal(
+        rrb.Spatial2DView(
+            origin="decomposition",
+            name="Cells and critical points",
+            contents=["$origin/cells/**", "$origin/critical_points/**"],
+        ),
+        rrb.Vertical(
+            rrb.GraphView(origin="decomposition/reeb", name="Reeb graph"),
+            rrb.TimeSeriesView(origin="decomposition/scores", name="Predicted cost of each heading"),
+            row_shares=[3, 1],
+        ),
+        column_shares=[3, 2],
+        name="Decomposition",
+    )
+
+
+def _certificate() -> rrb.Spatial2DView:
+    return rrb.Spatial2DView(origin="/", name="Certificate", contents=["contour/raw/**", "certificate/**"])
+
+
+def _log() -> rrb.Vertical:
+    return rrb.Vertical(
+        rrb.TextLogView(origin="log", name="Log"),
+        rrb.DataframeView(
+            origin="/", name="Timings and figures", contents=["mission/**", "certificate/figures/**"]
+        ),
+        name="Log and timings",
+    )

@@ -1,0 +1,160 @@
+"""How a layer becomes rerun archetypes: flat for the stage's own tab, and on the map.
+
+rerun's flat views have y downwards, so that northings are negated in them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import rerun as rr
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from oxbow.contracts import FloatArray
+from oxbow.frame import Frame
+from oxbow.recording import Colour, Layer, LayerKind
+
+__all__ = ["Drawn", "draw"]
+
+PALETTE: dict[tuple[str, str], Colour] = {
+    ("mission", "site"): (120, 144, 156),
+    ("contour", "raw"): (120, 144, 156),
+    ("contour", "simplified"): (255, 179, 0),
+    ("contour", "eroded"): (38, 166, 154),
+    ("contour", "dropped"): (229, 57, 53),
+    ("decomposition", "cells"): (100, 181, 246),
+    ("decomposition", "critical_points"): (255, 112, 67),
+    ("path", "iterations"): (186, 104, 200),
+    ("path", "transects"): (144, 164, 174),
+    ("path", "circuit"): (255, 179, 0),
+    ("path", "cuts"): (236, 64, 122),
+    ("path", "path"): (66, 165, 245),
+    ("certificate", "path"): (66, 165, 245),
+}
+OTHER: Colour = (176, 190, 197)
+NEAR, FAR = np.array([38, 166, 154]), np.array([229, 57, 53])
+"""Ends of the scale for values from 0 to 1."""
+
+MOST_LABELS = 40
+"""More labels than these are kept, but not shown at once."""
+
+ON_MAP = frozenset({("mission", "site"), ("contour", "eroded"), ("path", "path"), ("certificate", "worst_gap")})
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What to log, and under which entity path."""
+
+    entity: str
+    archetype: rr.AsComponents
+
+
+def draw(layer: Layer, frame: Frame | None) -> Iterator[Drawn]:
+    """Everything that one layer logs; the map's share only where the frame is known."""
+    entity = f"{layer.stage}/{layer.name}"
+    if layer.kind is LayerKind.GRAPH:
+        yield from _graph(layer, entity)
+    if layer.kind is LayerKind.GEOMETRY:
+        yield from _flat(layer, entity)
+        if frame is not None and (layer.stage, layer.name) in ON_MAP:
+            yield from _on_map(layer, frame)
+    for name, value in layer.scalars.items():
+        yield Drawn(f"{entity}/{name}", rr.Scalars(value))
+    if layer.text:
+        level = rr.TextLogLevel.ERROR if layer.name == "failed" else rr.TextLogLevel.INFO
+        yield Drawn(f"log/{layer.stage}", rr.TextLog(layer.text, level=level))
+
+
+def _flat(layer: Layer, entity: str) -> Iterator[Drawn]:
+    strips, owners = _strips(layer.geometries)
+    colours = _colours(layer)
+    labels = [layer.labels[owner] for owner in owners] if layer.labels else None
+    show_labels = labels is not None and len(labels) <= MOST_LABELS
+    if strips:
+        yield Drawn(
+            f"{entity}/lines",
+            rr.LineStrips2D(
+                [strip * (1, -1) for strip in strips],
+                colors=colours[owners],
+                labels=labels,
+                show_labels=show_labels,
+                radii=layer.width_m / 2 if layer.width_m > 0 else rr.Radius.ui_points(1.0),
+            ),
+        )
+    points, number = _points(layer.geometries)
+    if len(points):
+        yield Drawn(
+            f"{entity}/points",
+            rr.Points2D(
+                points * (1, -1),
+                colors=colours[number],
+                labels=[layer.labels[index] for index in number] if layer.labels else None,
+                show_labels=bool(layer.labels) and len(points) <= MOST_LABELS,
+                radii=rr.Radius.ui_points(3.5),
+            ),
+        )
+
+
+def _on_map(layer: Layer, frame: Frame) -> Iterator[Drawn]:
+    strips, owners = _strips(layer.geometries)
+    colours = _colours(layer)
+    if strips:
+        lines = [frame.to_degrees(strip)[:, ::-1] for strip in strips]
+        archetype = rr.GeoLineStrings(lat_lon=lines, colors=colours[owners], radii=rr.Radius.ui_points(1.5))
+        yield Drawn(f"map/{layer.stage}/{layer.name}/lines", archetype)
+    points, number = _points(layer.geometries)
+    if len(points):
+        places = frame.to_degrees(points)[:, ::-1]
+        dots = rr.GeoPoints(lat_lon=places, colors=colours[number], radii=rr.Radius.ui_points(5.0))
+        yield Drawn(f"map/{layer.stage}/{layer.name}/points", dots)
+
+
+def _graph(layer: Layer, entity: str) -> Iterator[Drawn]:
+    names = [str(index) for index in range(len(layer.nodes))]
+    places = shapely.get_coordinates(np.asarray(layer.geometries)) if layer.geometries else None
+    kinds = sorted(set(layer.nodes))
+    hues = [tuple(PALETTE.values())[3 + kinds.index(node)] for node in layer.nodes]
+    yield Drawn(
+        entity,
+        rr.GraphNodes(
+            names,
+            labels=list(layer.nodes),
+            colors=hues,
+            positions=None if places is None else places * (1, -1),
+            show_labels=len(names) <= MOST_LABELS,
+        ),
+    )
+    edges = [(str(a), str(b)) for a, b in layer.edges]
+    yield Drawn(f"{entity}/edges", rr.GraphEdges(edges, graph_type="undirected"))
+
+
+def _strips(geometries: tuple[BaseGeometry, ...]) -> tuple[list[FloatArray], list[int]]:
+    """All lines and rings, and the number of the geometry of each."""
+    strips, owners = [], []
+    for number, geometry in enumerate(geometries):
+        for part in shapely.get_parts(geometry):
+            lines = shapely.get_rings(part) if part.geom_type == "Polygon" else [part]
+            for line in lines:
+                if line.geom_type != "Point" and not line.is_empty:
+                    strips.append(shapely.get_coordinates(line))
+                    owners.append(number)
+    return strips, owners
+
+
+def _points(geometries: tuple[BaseGeometry, ...]) -> tuple[FloatArray, list[int]]:
+    numbered = [(number, part) for number, whole in enumerate(geometries) for part in shapely.get_parts(whole)]
+    points = [(number, part) for number, part in numbered if part.geom_type == "Point"]
+    places = shapely.get_coordinates([part for _, part in points]) if points else np.empty((0, 2))
+    return places, [number for number, _ in points]
+
+
+def _colours(layer: Layer) -> np.ndarray[tuple[int, int], np.dtype[np.uint8]]:
+    """One colour a geometry: by value, or the layer's, or the palette's."""
+    if layer.values:
+        share = np.clip(np.asarray(layer.values), 0.0, 1.0)[:, None]
+        return np.asarray(NEAR + share * (FAR - NEAR), dtype=np.uint8)
+    one = layer.colour or PALETTE.get((layer.stage, layer.name), OTHER)
+    return np.tile(np.asarray(one, dtype=np.uint8), (len(layer.geometries), 1))
