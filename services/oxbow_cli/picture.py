@@ -62,7 +62,7 @@ def draw(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     if width_px < 1:
         raise InvalidMission(f"is {width_px}; expected a width of at least 1 pixel", where="width_px")
     site = Site.of(mission)
-    figure, axes = _sheet(site, width_px)
+    figure, axes = _sheet(site)
     _draw_site(axes, site, mission.safety_m)
     if mission.master_path:
         _draw_path(axes, site.frame.to_planar(lonlat(mission.master_path)), site.nominal_spacing_m)
@@ -77,7 +77,7 @@ def draw(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     write_atomically(path, picture.getvalue())
 
 
-def _sheet(site: Site, width_px: int) -> tuple[Figure, Axes]:
+def _sheet(site: Site) -> tuple[Figure, Axes]:
     """A sheet of fixed width in inches, as tall as the site needs, and the map's axes in metres."""
     west, south, east, north = shapely.union_all(
         [site.outline, shapely.Point(site.launch), shapely.Point(site.recovery)]
