@@ -56,13 +56,19 @@ def show(section: Section, console: Console) -> None:
     for name in section.rows[0] if section.rows else ():
         table.add_column(name, justify="left" if isinstance(section.rows[0][name], str) else "right")
     for row in section.rows:
-        table.add_row(*(figure if isinstance(figure, str) else f"{figure:,.4g}" for figure in row.values()))
+        table.add_row(*map(_cell, row.values()))
     console.print(table)
     for goal in section.goals:
         console.print(f"  {goal}", style="green" if goal.is_met else "bold red", highlight=False)
     if section.note:
         console.print(f"  {section.note}", style="dim", highlight=False)
     console.print()
+
+
+def _cell(figure: Figure) -> str:
+    if isinstance(figure, str):
+        return figure
+    return f"{figure:,}" if isinstance(figure, int) else f"{figure:.3g}"
 
 
 def keep(sections: dict[str, list[Section]], file: Path) -> None:
