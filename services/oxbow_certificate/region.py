@@ -68,7 +68,7 @@ class JudgedSpace:
 
 
 def _detail(water: MultiPolygon, request: CertifyRequest) -> float:
-    """Tolerance that moves area, distances and erosion by no more than a thousandth: a million vertices need one."""
+    """Tolerance that moves area, distances and erosion by at most a thousandth: a million vertices need one."""
     scales = [water.area / water.length, least_radius(water.area, request.path.length)]
     if request.safety_m:
         scales.append(request.safety_m)

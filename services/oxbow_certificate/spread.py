@@ -45,8 +45,8 @@ def even_places(region: MultiPolygon, count: int) -> FloatArray:
     """Places (count, 2) spread over `region` evenly by area: the same for the same arguments.
 
     The region is cut into triangles, laid end to end by area, and each of `count` equal shares of the whole takes
-    one place: within a triangle they are a Fibonacci lattice. No place is rejected, however thin the region, and no
-    grid falls into step with parallel transects.
+    one place: within a triangle they are a Fibonacci lattice. No place is rejected, however thin the region, and
+    no grid falls into step with parallel transects.
     """
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(region))
     corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
