@@ -6,6 +6,7 @@ import os
 import stat
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,7 +15,9 @@ from hypothesis import strategies as st
 from oxbow.contracts import MAX_REQUEST_BYTES
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.mission import Mission, mission_json, parse_mission, read_mission, require_plannable, write_mission
+from oxbow.pipeline import plan_mission
 from oxbow.site import Site
+from oxbow_cli.local import local_call
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "docs/examples").glob("*.json"))
 
@@ -277,3 +280,31 @@ def test_a_million_points_are_read():
     )
     text = '{"MissionType":"map","LaunchPoint":{"lat":46.0,"long":1.5},"BoundingBox":[' + outline + "]}"
     assert len(parse_mission(text.encode()).outline) == 1_000_000
+
+
+SCHEMA = json.loads((Path(__file__).parents[2] / "docs/mission-file.schema.json").read_text())
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_and_their_plans_follow_the_schema(path):
+    validator = jsonschema.Draft202012Validator(SCHEMA)
+    validator.validate(json.loads(path.read_text()))
+    completed = plan_mission(read_mission(path), call=local_call())
+    validator.validate(json.loads(mission_json(completed)))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"MissionType": "mapp"},
+        {"LaunchPoint": [46.0, 1.0]},
+        {"BoundingBox": SQUARE[:2]},
+        {"Safety": -1},
+        {"Master_length": 0},
+        {"MissionType": "adap"},
+        {"InBox": SQUARE},
+    ],
+)
+def test_the_schema_refuses_what_the_parser_refuses(changes):
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(given_mission(**changes), SCHEMA)
