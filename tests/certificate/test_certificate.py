@@ -1,0 +1,173 @@
+"""The certificate: exact cases, bounds that hold, adversarial paths, and agreement with an independent judge."""
+
+import importlib.util
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import LineString, Point, Polygon, affinity, box
+
+from oxbow.contracts import Certificate, CertifyRequest
+from oxbow.errors import Infeasible
+from oxbow.mission import mission_json, read_mission
+from oxbow.pipeline import plan_mission
+from oxbow.recording import Layer, discard
+from oxbow_certificate.conformance import count_crossings
+from oxbow_certificate.cover import least_radius
+from oxbow_certificate.service import handle
+from oxbow_cli.evaluation import evaluate
+from oxbow_cli.local import local_call
+
+SQUARE = box(0, 0, 100, 100)
+quick = settings(deadline=None, max_examples=8, derandomize=True)
+
+
+def certified(path, outline: Polygon = SQUARE, **changes) -> Certificate:
+    line = LineString(path)
+    fields = {"launch": line.coords[0], "recovery": line.coords[-1]} | changes
+    return handle(CertifyRequest(outline=outline, path=line, **fields), discard)
+
+
+def test_a_segment_through_the_middle_of_a_square():
+    judged = certified([(0, 50), (100, 50)], speed_mps=2.0)
+    low, high = judged.cover_radius_m
+    assert low <= 50 <= high <= 50.5
+    assert judged.q == pytest.approx(high / least_radius(1e4, 100))
+    assert judged.mean_distance_m == pytest.approx(25, rel=0.01)
+    assert judged.p95_distance_m == pytest.approx(47.5, rel=0.01)
+    assert (judged.length_m, judged.duration_s, judged.waypoints) == (100, 50, 2)
+    assert judged.is_simple
+    assert judged.judged_area == pytest.approx(1)
+
+
+def test_a_circle_in_an_annulus():
+    middle = Point(0, 0).buffer(75, quad_segs=64).exterior
+    island = Point(0, 0).buffer(50, quad_segs=64)
+    judged = certified(middle, Point(0, 0).buffer(100, quad_segs=64), zones=(island,))
+    assert judged.cover_radius_m[0] == pytest.approx(25, rel=0.01)
+    assert judged.free_area_m2 == pytest.approx(math.pi * 7500, rel=0.01)
+
+
+def test_the_least_radius_solves_its_equation():
+    radius = least_radius(5000.0, 300.0)
+    assert 2 * radius * 300 + math.pi * radius**2 == pytest.approx(5000)
+
+
+def test_the_worst_gap_is_where_the_path_is_not():
+    judged = certified([(0, 10), (100, 10)])
+    assert judged.worst_gap is not None
+    assert judged.worst_gap[1] == pytest.approx(100, abs=1.5)
+
+
+walks = st.lists(st.tuples(st.floats(0, 100), st.floats(0, 100)), min_size=2, max_size=12, unique=True)
+
+
+@quick
+@given(walks)
+def test_the_bounds_hold_and_are_tight(walk):
+    judged = certified(walk)
+    grid = np.stack(np.meshgrid(np.linspace(0, 100, 60), np.linspace(0, 100, 60)), axis=-1).reshape(-1, 2)
+    seen = shapely.distance(LineString(walk), shapely.points(grid)).max()
+    low, high = judged.cover_radius_m
+    assert low <= high <= 1.011 * low
+    assert seen <= high
+    assert judged.q >= 1 - 1e-9
+
+
+@quick
+@given(walks, st.floats(0, 6.28), st.floats(-1e5, 1e5), st.floats(0.1, 50))
+def test_turned_moved_and_scaled(walk, angle, shift, scale):
+    def changed(geometry):
+        turned = affinity.rotate(geometry, angle, origin=(0, 0), use_radians=True)
+        return affinity.translate(affinity.scale(turned, scale, scale, origin=(0, 0)), shift, -shift)
+
+    here, there = certified(walk), certified(changed(LineString(walk)), changed(SQUARE))
+    assert there.cover_radius_m[0] == pytest.approx(scale * here.cover_radius_m[0], rel=0.011)
+    assert there.q == pytest.approx(here.q, rel=0.011)
+    assert there.mean_distance_m == pytest.approx(scale * here.mean_distance_m, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("path", "crossings"),
+    [
+        ([(0, 0), (10, 0), (10, 10), (0, 10), (0, 0)], 0),
+        ([(0, 0), (10, 10), (10, 0), (0, 10)], 1),
+        ([(0, 0), (10, 0), (5, 0)], 1),
+        ([(0, 0), (10, 0), (10, 5), (5, 5), (5, -5), (0, -5)], 1),
+    ],
+    ids=["ring", "eight", "retraced", "hook"],
+)
+def test_crossings_are_counted(path, crossings):
+    assert (count_crossings(LineString(path)) > 0) == (crossings > 0)
+    judged = certified([(40 + x, 40 + y) for x, y in path])
+    assert judged.is_simple == (crossings == 0)
+
+
+def test_repeated_points_are_no_crossing():
+    assert certified([(10, 10), (10, 10), (90, 10), (90, 10), (90, 90)]).crossings == 0
+
+
+def test_the_outside_and_the_unsafe_are_measured():
+    zone = box(40, 0, 60, 50)
+    judged = certified([(5, 25), (95, 25)], zones=(zone,), safety_m=5.0)
+    assert judged.outside_m == pytest.approx(20, abs=0.1)
+    assert judged.unsafe_m == pytest.approx(30, abs=0.5)
+    assert certified([(10, 70), (90, 70)], zones=(zone,), safety_m=5.0).unsafe_m == 0
+
+
+def test_legs_from_the_shore_are_excused():
+    ring = [(50, 0), (50, 20), (80, 20), (80, 80), (20, 80), (20, 20), (49, 20), (50, 0)]
+    judged = certified(ring, safety_m=10.0)
+    assert judged.unsafe_m == 0
+    assert judged.outside_m == 0
+
+
+def test_parts_that_the_path_never_enters_are_not_judged():
+    judged = certified([(10, 50), (40, 50)], zones=(box(48, -1, 52, 101),), safety_m=1.0)
+    assert judged.components == 2
+    assert judged.judged_area == pytest.approx(0.5, rel=0.01)
+
+
+def test_a_path_that_never_enters_the_water_still_gets_a_certificate():
+    judged = certified([(200, 200), (300, 200)], launch=(200, 200), recovery=(300, 200))
+    assert judged.judged_area == 0
+    assert judged.outside_m == pytest.approx(100)
+    json.dumps({"q": judged.q}, allow_nan=False)
+
+
+def test_nothing_left_by_the_safety_distance_is_infeasible():
+    with pytest.raises(Infeasible):
+        certified([(10, 10), (90, 90)], safety_m=60.0)
+
+
+def test_every_step_is_shown():
+    layers: list[Layer] = []
+    line = LineString([(0, 50), (100, 50)])
+    handle(CertifyRequest(outline=SQUARE, path=line, launch=(0, 50), recovery=(100, 50)), layers.append)
+    assert {layer.name for layer in layers} == {"path", "gaps", "worst_gap", "figures"}
+
+
+SHARED = Path(__file__).parents[2] / "../shared"
+
+
+@pytest.mark.skipif(not SHARED.exists(), reason="needs the shared missions and their judge")
+@pytest.mark.parametrize("name", ["lake-N72.1W106.5", "lake-S04.2E015.4"])
+def test_agrees_with_the_independent_judge(name):
+    spec = importlib.util.spec_from_file_location("referee", SHARED / "referee/referee.py")
+    assert spec is not None
+    referee = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(referee)
+    mission = plan_mission(read_mission(SHARED / f"data/missions/{name}.json"), call=local_call())
+    judged = referee.judge(json.loads(mission_json(mission)))
+    assert mission.plan is not None
+    for own in (mission.plan.certificate, evaluate(mission)):
+        assert own.crossings == judged["crossings"] == 0
+        assert own.outside_m == judged["outside_m"] == 0
+        assert own.unsafe_m == pytest.approx(judged["unsafe_m"], abs=0.01)
+        for measure in ("length_m", "free_area_m2", "q", "mean_distance_m", "p95_distance_m", "judged_area"):
+            assert getattr(own, measure) == pytest.approx(judged[measure], rel=0.01), measure
