@@ -21,7 +21,7 @@ def segments_of(path: LineString) -> npt.NDArray[Any]:
     return np.asarray(shapely.linestrings(ends[(ends[:, 0] != ends[:, 1]).any(axis=1)]))
 
 
-_PIECES = 8_000
+_PIECES = 2_000
 """A path is cut into some so many pieces at least: the box of a long oblique segment is mostly empty."""
 
 
