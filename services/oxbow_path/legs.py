@@ -133,8 +133,9 @@ def joined(
                 return path
         # Another detail makes another triangulation, whose way may keep clear of what this one touched.
         opening_m, detail_m = opening_m / 2, detail_m * OTHER_DETAIL
-    if any(len(leg.leg) > 2 for leg in (launch, recovery)):
-        raise Infeasible("is reached only by water too narrow to come back beside the way out", "LaunchPoint")
+    for leg, where in ((launch, "LaunchPoint"), (recovery, "RecoveryPoint")):
+        if len(leg.leg) > 2:
+            raise Infeasible("is reached only by water too narrow to come back beside the way out", where)
     raise Internal(f"the legs from {launch.place} and to {recovery.place} do not fit the ring", "legs")
 
 
