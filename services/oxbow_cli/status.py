@@ -48,8 +48,8 @@ def status_of(endpoint: str) -> StackStatus:
     with Bus.connect(endpoint, timeout_s=ANSWER_S) as bus:
         with suppress(Unavailable):
             bus.wait_ready(SERVICES, SEEN_S)
-        alive = {service: bus.instances(service) for service in SERVICES}
         pings, stats = _ask(bus, "ping", Ping), _ask(bus, "stats", Stats)
+        alive = {service: bus.instances(service) for service in SERVICES}  # by now, each replica has been seen
     missions: list[MissionStatus] = []
     if alive["mission"]:
         with Client(endpoint, timeout_s=ANSWER_S) as client:
