@@ -17,8 +17,8 @@ from oxbow.mission import Mission
 
 __all__ = ["Site"]
 
-MAX_SIZE_M = 300_000.0
-"""How large a site may be from side to side, and how far from the water a launch point may lie."""
+MAX_RADIUS_M = 300_000.0
+"""How far a site may reach from the mean of its contour's points, and a launch point may lie from the water."""
 LEAST_WIDTH_M = 1e-3
 """Points that lie in a strip narrower than this lie on one line."""
 
@@ -58,8 +58,8 @@ class Site:
         Raises
         ------
         InvalidMission
-            A contour has no area, the outline meets itself or is larger than 300 km, or a point lies
-            farther than that from the water; the error names field, index and value.
+            A contour has no area, the outline meets itself or reaches farther than 300 km from its mean
+            point, or a point lies farther than that from the water; the error names field, index and value.
         Infeasible
             The forbidden zones cover all of the water.
         """
@@ -119,22 +119,17 @@ def _too_few(name: str, degrees: FloatArray) -> InvalidMission:
 
 def _outline(contour: _Contour, frame: Frame) -> Polygon:
     polygon = contour.planar(frame)
-    xy = shapely.get_coordinates(polygon)[:-1]
-    size_m = float(np.ptp(xy, axis=0).max())
-    if size_m > MAX_SIZE_M:
-        farthest = int(np.argmax(np.hypot(*xy.T)))
+    radius_m = np.hypot(*shapely.get_coordinates(polygon).T)
+    if radius_m.max() > MAX_RADIUS_M:
+        farthest = int(np.argmax(radius_m[:-1]))
         raise InvalidMission(
-            f"makes the site {size_m / 1000:.0f} km large, at {_degrees_text(contour.degrees[farthest])};"
-            f" expected at most {MAX_SIZE_M / 1000:.0f} km from side to side",
+            f"is {radius_m.max() / 1000:.0f} km from the mean of the points;"
+            f" expected a site that reaches at most {MAX_RADIUS_M / 1000:.0f} km from there",
             where=f"{contour.name}[{contour.indices[farthest]}]",
         )
     if not polygon.is_valid:
         raise _crossing(contour, frame, polygon)
     return shapely.normalize(polygon)
-
-
-def _degrees_text(degrees: FloatArray) -> str:
-    return f"lat {degrees[1]:.6f}, long {degrees[0]:.6f}"
 
 
 def _crossing(contour: _Contour, frame: Frame, polygon: Polygon) -> InvalidMission:
@@ -184,11 +179,11 @@ def _place(name: str, position: Position, frame: Frame, outline: Polygon) -> Pla
     swapped = " (latitude and longitude look swapped)" if _is_near(degrees[:, ::-1], frame, outline) else ""
     raise InvalidMission(
         f"is lat {position.lat!r}, long {position.long!r}, {np.hypot(x, y) / 1000:.0f} km from the middle of the"
-        f" site; expected a place within {MAX_SIZE_M / 1000:.0f} km of the water{swapped}",
+        f" site; expected a place within {MAX_RADIUS_M / 1000:.0f} km of the water{swapped}",
         where=name,
     )
 
 
 def _is_near(degrees: FloatArray, frame: Frame, outline: Polygon) -> bool:
     xy = frame.to_planar(degrees)
-    return bool(np.isfinite(xy).all()) and bool(shapely.distance(outline, Point(xy[0])) <= MAX_SIZE_M)
+    return bool(np.isfinite(xy).all()) and bool(shapely.distance(outline, Point(xy[0])) <= MAX_RADIUS_M)
