@@ -53,8 +53,10 @@ class Section:
 def show(section: Section, console: Console) -> None:
     """Print a section as a table, with its goals below."""
     table = Table(title=section.title, title_justify="left")
-    for name in section.rows[0] if section.rows else ():
-        table.add_column(name, justify="left" if isinstance(section.rows[0][name], str) else "right")
+    for number, name in enumerate(section.rows[0] if section.rows else ()):
+        table.add_column(
+            name, justify="left" if number == 0 and isinstance(section.rows[0][name], str) else "right"
+        )
     for row in section.rows:
         table.add_row(*map(_cell, row.values()))
     console.print(table)
