@@ -168,10 +168,12 @@ def _on(ring: LinearRing, access: Access) -> bool:
 
 def _meeting(ring: LineString, entry: Point, free: Polygon) -> float:
     """Where along the ring a leg meets it: at the nearest place that is in sight."""
-    sights = shapely.linestrings(
-        [[entry.coords[0], place] for place in (ring.interpolate(ring.project(entry)).coords[0], *ring.coords)]
+    places = np.vstack(
+        [shapely.get_coordinates(ring.interpolate(ring.project(entry))), shapely.get_coordinates(ring)]
     )
-    nearest_first = sights[np.argsort(shapely.length(sights), kind="stable")][:SIGHTS]
+    here = shapely.get_coordinates(entry)
+    nearest = places[np.argsort(np.hypot(*(places - here).T), kind="stable")[:SIGHTS]]
+    nearest_first = shapely.linestrings(np.stack([np.broadcast_to(here, nearest.shape), nearest], axis=1))
     seen = nearest_first[shapely.covers(free.buffer(ROUNDING_M), nearest_first)]
     sight = seen[0] if len(seen) else nearest_first[0]
     return float(ring.project(Point(sight.coords[-1])))
