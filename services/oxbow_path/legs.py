@@ -173,7 +173,9 @@ def _meeting(ring: LineString, entry: Point, free: Polygon) -> float:
     )
     here = shapely.get_coordinates(entry)
     nearest = places[np.argsort(np.hypot(*(places - here).T), kind="stable")[:SIGHTS]]
-    nearest_first = shapely.linestrings(np.stack([np.broadcast_to(here, nearest.shape), nearest], axis=1))
+    nearest_first = np.asarray(
+        shapely.linestrings(np.stack([np.broadcast_to(here, nearest.shape), nearest], axis=1))
+    )
     seen = nearest_first[shapely.covers(free.buffer(ROUNDING_M), nearest_first)]
     sight = seen[0] if len(seen) else nearest_first[0]
     return float(ring.project(Point(sight.coords[-1])))
