@@ -29,7 +29,7 @@ def main(argv: list[str] | None = None) -> None:
     lifetime = Lifetime(options.parent)
     try:
         with Store(options.home) as store:
-            bus = _connect(options.connect, lifetime)
+            bus = Bus.join(options.connect, lambda: lifetime.over)
             if bus is not None:
                 with bus, Registry(store, bus) as registry:
                     _serve(bus, registry, options, lifetime)
@@ -46,16 +46,6 @@ def _serve(bus: Bus, registry: Registry, options: argparse.Namespace, lifetime: 
     lifetime.wait()
     if planner.failed:
         raise Internal("missions could not be kept; see the log", where=str(options.home))
-
-
-def _connect(endpoint: str, lifetime: Lifetime) -> Bus | None:
-    """Join the bus; waits for a router that is not there yet."""
-    while not lifetime.over:
-        try:
-            return Bus.connect(endpoint, timeout_s=1.0)
-        except Unavailable as error:
-            _log.warning("%s; waiting for it", error)
-    return None
 
 
 def _options(argv: list[str] | None) -> argparse.Namespace:

@@ -14,7 +14,7 @@ import platformdirs
 from oxbow.bus import DEFAULT_ENDPOINT, Session
 from oxbow.codec import decode
 from oxbow.contracts import ANY_LAYER, live_key
-from oxbow.errors import OxbowError, Unavailable
+from oxbow.errors import OxbowError
 from oxbow.lifetime import Lifetime
 from oxbow.recording import Stamped
 from oxbow_recorder.live import serve
@@ -42,7 +42,7 @@ def main(argv: list[str] | None = None) -> None:
         except (OxbowError, OSError) as error:
             _log.error("a layer on %s is not recorded: %s", key, error)
 
-    session = _connect(options.connect, lifetime)
+    session = Session.join(options.connect, lambda: lifetime.over)
     if session is not None:
         with session:
             subscription = session.subscribe(ANY_LAYER, record, queue_size=QUEUE)
@@ -51,16 +51,6 @@ def main(argv: list[str] | None = None) -> None:
             subscription.close()
     with lock:
         recordings.close()
-
-
-def _connect(endpoint: str, lifetime: Lifetime) -> Session | None:
-    """Join the bus; waits for a router that is not there yet."""
-    while not lifetime.over:
-        try:
-            return Session.connect(endpoint, timeout_s=1.0)
-        except Unavailable as error:
-            _log.warning("%s; waiting for it", error)
-    return None
 
 
 def _options(argv: list[str] | None) -> argparse.Namespace:

@@ -75,6 +75,16 @@ class Session:
                     ) from error
                 time.sleep(0.05)
 
+    @classmethod
+    def join(cls, endpoint: str, is_over: Callable[[], bool]) -> Self | None:
+        """Join the router at `endpoint`, waiting for one that is not there yet; None once `is_over`."""
+        while not is_over():
+            try:
+                return cls.connect(endpoint, timeout_s=1.0)
+            except Unavailable as error:
+                _log.warning("%s; waiting for it", error)
+        return None
+
     def __enter__(self) -> Self:
         return self
 

@@ -38,7 +38,7 @@ def serve_stage(endpoint: str, handler: str, argv: list[str] | None = None) -> N
     lifetime = Lifetime(options.parent)
     worker = Worker(endpoint, handler, options.instance)
     try:
-        session = _connect(options.connect, lifetime)
+        session = Session.join(options.connect, lambda: lifetime.over)
         if session is not None:
             with session:
                 _serve(session, worker, options, lifetime)
@@ -55,16 +55,6 @@ def _serve(session: Session, worker: Worker, options: argparse.Namespace, lifeti
     stage.drain()
     if stage.failed:
         raise Unavailable("no worker process", where=options.instance)
-
-
-def _connect(endpoint: str, lifetime: Lifetime) -> Session | None:
-    """Join the bus; waits for a router that is not there yet, as it does for one that comes back."""
-    while not lifetime.over:
-        try:
-            return Session.connect(endpoint, timeout_s=1.0)
-        except Unavailable as error:
-            _log.warning("%s; waiting for it", error)
-    return None
 
 
 def _options(handler: str, argv: list[str] | None) -> argparse.Namespace:

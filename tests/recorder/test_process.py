@@ -1,0 +1,80 @@
+"""The recorder as a process on the real bus: it finishes its files when told to end, and planning outlives it."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import shapely
+
+from oxbow.bus import Session
+from oxbow.bus.router import start_router
+from oxbow.codec import encode
+from oxbow.contracts import layer_key
+from oxbow.recording import Layer, Stamped
+
+pytestmark = pytest.mark.processes
+
+
+@pytest.fixture
+def bus():
+    router = start_router()
+    try:
+        with Session.connect(router.endpoint) as session:
+            yield session
+    finally:
+        router.process.terminate()
+        router.process.wait(10)
+
+
+@pytest.fixture
+def recorder(bus, tmp_path):
+    arguments = ["--connect", bus.endpoint, "--instance", "r1", "--folder", tmp_path, "--parent", os.getpid()]
+    process = subprocess.Popen([sys.executable, "-m", "oxbow_recorder", *map(str, arguments)])
+    try:
+        wait_until(lambda: bool(bus.audience(layer_key("m", "path", "path"))))
+        yield process
+    finally:
+        process.kill()
+        process.wait(10)
+
+
+def wait_until(holds):
+    give_up = time.monotonic() + 30
+    while not holds():
+        assert time.monotonic() < give_up
+        time.sleep(0.05)
+
+
+def show(bus, step):
+    line = shapely.LineString([(0, 0), (step, 1)])
+    layer = Layer(stage="path", name="path", step=step, geometries=(line,))
+    stamped = Stamped(mission_id="m", request_id="r", time_s=1.7e9 + step, layer=layer)
+    bus.publish(layer_key("m", "path", "path"), encode(stamped), encoding="application/msgpack", droppable=True)
+
+
+def test_it_finishes_its_files_when_told_to_end(bus, recorder, tmp_path):
+    for step in range(1, 20):
+        show(bus, step)
+    wait_until(lambda: any(tmp_path.glob(".*.rrd")))
+    recorder.send_signal(signal.SIGTERM)
+    assert recorder.wait(20) == 0
+    verified = subprocess.run(
+        [sys.executable, "-m", "rerun", "rrd", "verify", str(tmp_path / "m.rrd")],
+        capture_output=True,
+        timeout=60,
+        check=False,
+    )
+    assert verified.returncode == 0
+
+
+def test_showing_goes_on_without_it(bus, recorder, tmp_path):
+    show(bus, 1)
+    wait_until(lambda: any(tmp_path.glob(".*.rrd")))
+    recorder.kill()
+    recorder.wait(10)
+    wait_until(lambda: not bus.audience(layer_key("m", "path", "path")))
+    for step in range(2, 500):
+        show(bus, step)
