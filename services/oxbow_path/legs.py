@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -22,7 +23,7 @@ from oxbow.errors import Infeasible, Internal
 from oxbow_path.routes import Routes, taut
 from oxbow_path.walk import largest
 
-__all__ = ["ROUNDING_M", "Access", "access", "is_plainly_simple", "joined"]
+__all__ = ["ROUNDING_M", "Access", "Passable", "access", "is_plainly_simple", "joined"]
 
 ROUNDING_M = 1e-6
 """Places nearer to each other than this are one."""
@@ -63,11 +64,38 @@ class Access:
         return LineString(self.leg)
 
 
-def access(place: Place, free: Polygon, water: Routes, *, clearance_m: float, where: str) -> Access:
+@dataclass(frozen=True)
+class Passable:
+    """Where a path may run: the free space, which only its legs may leave, and the water."""
+
+    free: Polygon
+    water: Polygon
+
+    @cached_property
+    def free_and_rounding(self) -> BaseGeometry:
+        """The free space, and what rounding adds to it."""
+        grown = self.free.buffer(ROUNDING_M)
+        shapely.prepare(grown)
+        return grown
+
+    @cached_property
+    def water_and_rounding(self) -> BaseGeometry:
+        """The water, and what rounding adds to it."""
+        return self.water.buffer(ROUNDING_M)
+
+    def outside(self, path: LineString) -> BaseGeometry:
+        """What of a path lies outside the free space."""
+        points = shapely.get_coordinates(path)
+        segments = np.asarray(shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1)))
+        stray = segments[~shapely.covers(self.free_and_rounding, segments)]
+        return shapely.union_all(shapely.difference(stray, self.free_and_rounding))
+
+
+def access(place: Place, free: Polygon, water: Routes, *, where: str) -> Access:
     """The leg from a launch or recovery point to the free space.
 
     The shortest line, where the water allows it or the point lies ashore. Else along the middle of the water,
-    pulled tight wherever that keeps `clearance_m` from the shore.
+    pulled tight wherever that keeps half the safety distance from the shore.
 
     Raises
     ------
@@ -85,6 +113,7 @@ def access(place: Place, free: Polygon, water: Routes, *, clearance_m: float, wh
     route = water.to_area(np.array(place), free, water.goals_in(free))
     if route is None:
         raise Infeasible(f"no way through the water leads from {place} to the free space", where)
+    clearance_m = shapely.distance(Point(straight.coords[-1]), water.water.boundary) / 2
     roomy = water.water.buffer(-clearance_m).union(point.buffer(4 * clearance_m).intersection(water.water))
     outside = shapely.get_parts(taut(route, roomy).difference(free))[0]
     return Access(shapely.get_coordinates(outside))
@@ -94,7 +123,7 @@ def joined(
     region: Polygon,
     launch: Access,
     recovery: Access,
-    waters: tuple[Polygon, Polygon],
+    passable: Passable,
     *,
     opening_m: float,
     detail_m: float,
@@ -107,7 +136,7 @@ def joined(
         The walk's region; both entries lie in it or on its boundary.
     launch, recovery
         How the two points are reached.
-    waters
+    passable
         The free space, which only the legs may leave, and the water, which only legs from ashore may leave.
     opening_m
         Width of the ring's opening at most; it is a tenth of the shorter leg, and halved until the legs fit
@@ -124,11 +153,10 @@ def joined(
     """
     lengths = [leg.line.length / 10 for leg in (launch, recovery) if leg.line.length > ROUNDING_M]
     opening_m = min([opening_m, region.exterior.length / 8, *lengths])
-    free, water = (polygon.buffer(ROUNDING_M) for polygon in waters)
     for _ in range(HALVINGS):
-        allowed = [_corridor(leg, water, opening_m) for leg in (launch, recovery)]
-        for path in _candidates(region, launch, recovery, waters[0], opening_m, detail_m):
-            legs = path.difference(free)
+        allowed = [_corridor(leg, passable.water_and_rounding, opening_m) for leg in (launch, recovery)]
+        for path in _candidates(region, launch, recovery, passable, opening_m, detail_m):
+            legs = passable.outside(path)
             if is_plainly_simple(path) and legs.difference(shapely.union_all(allowed)).length < ROUNDING_M:
                 return path
         # Another detail makes another triangulation, whose way may keep clear of what this one touched.
@@ -151,12 +179,12 @@ def _corridor(leg: Access, water: BaseGeometry, width_m: float) -> BaseGeometry:
 
 
 def _candidates(
-    region: Polygon, launch: Access, recovery: Access, free: Polygon, opening_m: float, detail_m: float
+    region: Polygon, launch: Access, recovery: Access, passable: Passable, opening_m: float, detail_m: float
 ) -> Iterator[LineString]:
     if launch.place == recovery.place:
-        return _closed(region.exterior, launch, free, opening_m)
+        return _closed(region.exterior, launch, passable.free_and_rounding, opening_m)
     # What the region encloses may be land.
-    inside = largest(region.intersection(free))
+    inside = largest(region.intersection(passable.free))
     if _on(region.exterior, recovery) and not _on(region.exterior, launch):
         return (path.reverse() for path in _open(inside, recovery, launch, opening_m, detail_m))
     return _open(inside, launch, recovery, opening_m, detail_m)
@@ -166,7 +194,7 @@ def _on(ring: LinearRing, access: Access) -> bool:
     return bool(shapely.dwithin(access.entry, ring, ROUNDING_M))
 
 
-def _meeting(ring: LineString, entry: Point, free: Polygon) -> float:
+def _meeting(ring: LineString, entry: Point, free: BaseGeometry) -> float:
     """Where along the ring a leg meets it: at the nearest place that is in sight."""
     places = np.vstack(
         [shapely.get_coordinates(ring.interpolate(ring.project(entry))), shapely.get_coordinates(ring)]
@@ -176,12 +204,12 @@ def _meeting(ring: LineString, entry: Point, free: Polygon) -> float:
     nearest_first = np.asarray(
         shapely.linestrings(np.stack([np.broadcast_to(here, nearest.shape), nearest], axis=1))
     )
-    seen = nearest_first[shapely.covers(free.buffer(ROUNDING_M), nearest_first)]
+    seen = nearest_first[shapely.covers(free, nearest_first)]
     sight = seen[0] if len(seen) else nearest_first[0]
     return float(ring.project(Point(sight.coords[-1])))
 
 
-def _closed(ring: LinearRing, launch: Access, free: Polygon, opening_m: float) -> Iterator[LineString]:
+def _closed(ring: LinearRing, launch: Access, free: BaseGeometry, opening_m: float) -> Iterator[LineString]:
     """Out to the ring, round it, and back beside the way out."""
     line = LineString(ring)
     at = _meeting(line, launch.entry, free)
@@ -212,7 +240,8 @@ def _open(
     divides the ring: one side, back through the middle, the other side.
     """
     line = LineString(inside.exterior)
-    start, end = (_meeting(line, leg.entry, inside) for leg in (launch, recovery))
+    sight = inside.buffer(ROUNDING_M)
+    start, end = (_meeting(line, leg.entry, sight) for leg in (launch, recovery))
     inner_leg = LineString([launch.entry, line.interpolate(start)])
     through = Routes(_without(inside, inner_leg, opening_m / 16), detail_m)
     if not _on(inside.exterior, recovery):

@@ -14,7 +14,7 @@ from shapely import Point
 from oxbow.contracts import PathRequest
 from oxbow.errors import Infeasible
 from oxbow.sweep import to_sweep
-from oxbow_path.legs import access
+from oxbow_path.legs import Passable, access
 from oxbow_path.probe import Probe
 from oxbow_path.remainder import with_remainder
 from oxbow_path.routes import Routes
@@ -131,15 +131,14 @@ def _waters(request: PathRequest, spacing_m: float) -> Waters:
     free, water = (shapely.transform(polygon, turn) for polygon in (request.space.free, request.space.water))
     shapely.prepare([free, water])
     shore = Routes(water, spacing_m)
-    clearance_m = float(shapely.distance(free.exterior, water.exterior)) / 2
     (launch, recovery) = turn(np.array([request.launch, request.recovery]))
     return Waters(
         spacing_m=spacing_m,
         cells=request.decomposition.cells,
         free=free,
-        water=water,
+        passable=Passable(free, water),
         probe=Probe.over(free, PROBE_PITCH * spacing_m),
         routes=Routes(free, PROBE_PITCH * spacing_m),
-        launch=access(tuple(launch), free, shore, clearance_m=clearance_m, where="LaunchPoint"),
-        recovery=access(tuple(recovery), free, shore, clearance_m=clearance_m, where="RecoveryPoint"),
+        launch=access(tuple(launch), free, shore, where="LaunchPoint"),
+        recovery=access(tuple(recovery), free, shore, where="RecoveryPoint"),
     )

@@ -12,7 +12,7 @@ from shapely import LineString, Point, Polygon
 from oxbow.contracts import Cell
 from oxbow_path.circuit import Circuit, plan_circuit
 from oxbow_path.gaps import branch_to, reach_gaps
-from oxbow_path.legs import ROUNDING_M, Access, is_plainly_simple, joined
+from oxbow_path.legs import ROUNDING_M, Access, Passable, is_plainly_simple, joined
 from oxbow_path.probe import Probe
 from oxbow_path.routes import Routes
 from oxbow_path.transects import place_transects
@@ -46,7 +46,7 @@ class Waters:
     spacing_m: float
     cells: tuple[Cell, ...]
     free: Polygon
-    water: Polygon
+    passable: Passable
     probe: Probe
     routes: Routes
     launch: Access
@@ -144,7 +144,7 @@ def finished(waters: Waters, pattern: Pattern, circuit: Circuit, walk: Walk) -> 
         walk.region,
         waters.launch,
         waters.recovery,
-        (waters.free, waters.water),
+        waters.passable,
         opening_m=pattern.cut_m,
         detail_m=pattern.half_width_m,
     )

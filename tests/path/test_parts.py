@@ -16,7 +16,7 @@ from oxbow.reeb import cell_polygon
 from oxbow_path.circuit import plan_circuit
 from oxbow_path.conformance import require_conforming
 from oxbow_path.gaps import reach_gaps
-from oxbow_path.legs import access, joined
+from oxbow_path.legs import Passable, access, joined
 from oxbow_path.planner import _waters, plan_transects
 from oxbow_path.probe import Probe, covered
 from oxbow_path.routes import Routes, taut
@@ -166,7 +166,7 @@ REGION = box(100, 100, 900, 500)
 
 
 def leg(place):
-    return access(place, FREE, Routes(WATER, 50.0), clearance_m=5.0, where="LaunchPoint")
+    return access(place, FREE, Routes(WATER, 50.0), where="LaunchPoint")
 
 
 def test_a_leg_from_the_shore_is_the_shortest():
@@ -179,7 +179,7 @@ def test_a_leg_from_the_shore_is_the_shortest():
 
 def test_a_leg_round_a_corner_stays_in_the_water():
     hook = shapely.union_all([box(0, 0, 1000, 600), box(1000, 0, 1200, 8), box(1192, 0, 1200, 300)])
-    way = access((1196.0, 290.0), FREE, Routes(hook, 50.0), clearance_m=2.0, where="LaunchPoint")
+    way = access((1196.0, 290.0), FREE, Routes(hook, 50.0), where="LaunchPoint")
     assert hook.buffer(1e-9).covers(way.line)
     assert way.line.length < 1.1 * (290 + 200)
 
@@ -199,7 +199,7 @@ def test_a_leg_round_a_corner_stays_in_the_water():
 )
 def test_legs_join_the_ring(launch, recovery):
     region = REGION.union(box(10, 290, 100, 310)).union(box(900, 290, 990, 310)).union(box(490, 10, 510, 100))
-    path = joined(region, leg(launch), leg(recovery), (FREE, WATER), opening_m=5.0, detail_m=50.0)
+    path = joined(region, leg(launch), leg(recovery), Passable(FREE, WATER), opening_m=5.0, detail_m=50.0)
     assert path.is_simple
     assert path.coords[0] == launch
     assert path.coords[-1] == recovery
@@ -212,10 +212,9 @@ def test_the_way_through_goes_round_an_enclosed_island():
     water = WATER.difference(Point(500, 300).buffer(50))
     region = REGION.union(box(10, 290, 100, 310)).union(box(900, 290, 990, 310))
     legs = [
-        access(place, free, Routes(water, 50.0), clearance_m=5.0, where="LaunchPoint")
-        for place in ((0.0, 300.0), (1000.0, 300.0))
+        access(place, free, Routes(water, 50.0), where="LaunchPoint") for place in ((0.0, 300.0), (1000.0, 300.0))
     ]
-    path = joined(region, *legs, (free, water), opening_m=5.0, detail_m=50.0)
+    path = joined(region, *legs, Passable(free, water), opening_m=5.0, detail_m=50.0)
     assert path.is_simple
     assert path.distance(Point(500, 300)) >= 59.9
 
