@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from shapely import Point
 
-from oxbow.contracts import PathRequest
+from oxbow.contracts import FreeSpace, PathRequest
 from oxbow.errors import Infeasible
 from oxbow.sweep import to_sweep
 from oxbow_path.legs import Passable, access
@@ -21,7 +21,7 @@ from oxbow_path.routes import Routes
 from oxbow_path.spacing import Budget, fitted
 from oxbow_path.transect import Pattern, Trial, Waters, try_pattern
 
-__all__ = ["TransectPlan", "plan_transects"]
+__all__ = ["ACCEPTED", "TransectPlan", "finest_spacing_m", "plan_transects"]
 
 LENGTH_USED = (0.97, 0.999)
 """Shares of the longest length that a path should use."""
@@ -36,6 +36,9 @@ REACHES = (1.5, 1.3, 1.8)
 PHASES = (0.25, 0.75)
 REACH_FOR_SPACING = 0.6
 """The fitting spacing falls about as the reach to this power."""
+
+FINEST = 200
+"""At most so many spacings make up the root of the water's area."""
 
 MANY_POINTS = 80_000
 """With more probe points than these, one pattern is fitted and not several."""
@@ -61,10 +64,11 @@ def plan_transects(request: PathRequest) -> TransectPlan:
     Infeasible
         Even the shortest way from launch to recovery is longer than the vehicle can go.
     """
-    nominal_m = request.space.free.area / request.length_m
-    waters = _waters(request, max(nominal_m, request.min_spacing_m))
+    least_spacing_m = max(request.min_spacing_m, finest_spacing_m(request.space))
+    nominal_m = max(request.space.free.area / request.length_m, least_spacing_m)
+    waters = _waters(request, nominal_m)
     enough, most = (share * request.length_m for share in LENGTH_USED)
-    budget = Budget(most, enough, request.min_spacing_m)
+    budget = Budget(most, enough, least_spacing_m)
     trials = tuple(_trials(waters, budget, FIRST_SPACING * nominal_m))
     fitting = [trial for trial in trials if budget.fits(trial.length_m)]
     if not fitting:
@@ -74,9 +78,17 @@ def plan_transects(request: PathRequest) -> TransectPlan:
             "Master_length",
         )
     chosen = min(fitting, key=lambda trial: _score(trial, waters, budget))
-    if chosen.pattern.spacing_m > request.min_spacing_m:
+    if chosen.pattern.spacing_m > least_spacing_m:
         chosen = with_remainder(chosen, waters, budget)
     return TransectPlan(waters, chosen, trials)
+
+
+def finest_spacing_m(space: FreeSpace) -> float:
+    """The least spacing that is planned: finer sampling of small waters takes long, and serves no one.
+
+    Rendas and Li 2016, section 1.2.1.2, find that the spacing needs a least value for small sites.
+    """
+    return math.sqrt(space.free.area) / FINEST
 
 
 def _trials(waters: Waters, budget: Budget, first_spacing_m: float) -> Iterator[Trial]:

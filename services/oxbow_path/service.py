@@ -15,7 +15,7 @@ from oxbow.sweep import from_sweep
 from oxbow_path.conformance import require_conforming
 from oxbow_path.dropped import dropped_parts
 from oxbow_path.legs import Access
-from oxbow_path.planner import ACCEPTED, TransectPlan, plan_transects
+from oxbow_path.planner import ACCEPTED, TransectPlan, finest_spacing_m, plan_transects
 from oxbow_path.show import show_plan
 
 __all__ = ["handle"]
@@ -68,6 +68,8 @@ def _length_warnings(plan: TransectPlan, request: PathRequest) -> Iterator[str]:
     if share < ACCEPTED:
         if plan.chosen.pattern.spacing_m <= request.min_spacing_m:
             reason = f"Minimal_spatial_rate keeps the spacing at {request.min_spacing_m:g} m"
+        elif plan.chosen.pattern.spacing_m <= finest_spacing_m(request.space):
+            reason = f"the water is small, and no spacing below {finest_spacing_m(request.space):.2g} m is planned"
         else:
             reason = "no spacing between those tried fits better"
         yield f"the path uses {share:.1%} of the longest length: {reason}"

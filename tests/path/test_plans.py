@@ -129,6 +129,16 @@ def test_least_spacing_binds_and_is_told():
     assert any("Minimal_spatial_rate" in warning for warning in plan.warnings)
 
 
+def test_a_length_that_small_water_cannot_use_is_told(monkeypatch):
+    monkeypatch.setattr("oxbow_path.planner.FINEST", 25)
+    water = box(0, 0, 30, 20)
+    asked = request(water, spacings=5000)
+    plan = handle(asked, discard)
+    require_sound(plan, asked)
+    assert plan.spacing_m == pytest.approx(np.sqrt(asked.space.free.area) / 25)
+    assert any("the water is small" in warning for warning in plan.warnings)
+
+
 def test_a_launch_point_ashore_is_told():
     water = box(0, 0, 1000, 800)
     asked = request(water, launch=(-50.0, 400.0))
