@@ -8,12 +8,12 @@ round the other side. (The report, Rendas and Li 2016, section 1.2.1.2, treats o
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 import shapely
-from shapely import LinearRing, LineString, Point, Polygon
+from shapely import LinearRing, LineString, Point, Polygon, box
 from shapely.affinity import rotate
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
@@ -27,6 +27,9 @@ __all__ = ["ROUNDING_M", "Access", "Passable", "access", "is_plainly_simple", "j
 
 ROUNDING_M = 1e-6
 """Places nearer to each other than this are one."""
+
+OPENING = 0.1
+"""Width of the ring's opening at most, as a share of the shorter leg."""
 
 OTHER_DETAIL = 0.83
 """Change of the detail from one attempt to the next."""
@@ -43,10 +46,12 @@ class Access:
     """How a launch or recovery point is reached: `leg` runs from it to the free space, through the water.
 
     A point inside the free space has a leg of no length; that of a point ashore runs straight over land first.
+    `beside` is where the way back may run: a tenth of the leg's length to either side, in the water.
     """
 
     leg: FloatArray
     ashore: bool = False
+    beside: Polygon = field(default_factory=Polygon)
 
     @property
     def place(self) -> Place:
@@ -66,10 +71,9 @@ class Access:
 
 @dataclass(frozen=True)
 class Passable:
-    """Where a path may run: the free space, which only its legs may leave, and the water."""
+    """Where a path may run but for its legs."""
 
     free: Polygon
-    water: Polygon
 
     @cached_property
     def free_and_rounding(self) -> BaseGeometry:
@@ -77,11 +81,6 @@ class Passable:
         grown = self.free.buffer(ROUNDING_M)
         shapely.prepare(grown)
         return grown
-
-    @cached_property
-    def water_and_rounding(self) -> BaseGeometry:
-        """The water, and what rounding adds to it."""
-        return self.water.buffer(ROUNDING_M)
 
     def outside(self, path: LineString) -> BaseGeometry:
         """What of a path lies outside the free space."""
@@ -107,16 +106,25 @@ def access(place: Place, free: Polygon, water: Routes, *, where: str) -> Access:
         return Access(np.array([place, place]))
     straight = shapely.shortest_line(point, free)
     if not water.water.covers(point):
-        return Access(shapely.get_coordinates(straight), ashore=True)
+        return Access(shapely.get_coordinates(straight), ashore=True, beside=_beside_line(straight))
     if water.water.covers(straight):
-        return Access(shapely.get_coordinates(straight))
+        return _in_water(straight, water.water)
     route = water.to_area(np.array(place), free, water.goals_in(free))
     if route is None:
         raise Infeasible(f"no way through the water leads from {place} to the free space", where)
     clearance_m = shapely.distance(Point(straight.coords[-1]), water.water.boundary) / 2
-    roomy = water.water.buffer(-clearance_m).union(point.buffer(4 * clearance_m).intersection(water.water))
-    outside = shapely.get_parts(taut(route, roomy).difference(free))[0]
-    return Access(shapely.get_coordinates(outside))
+    around = water.water.intersection(box(*route.buffer(5 * clearance_m).bounds))
+    roomy = around.buffer(-clearance_m).union(point.buffer(4 * clearance_m).intersection(around))
+    return _in_water(shapely.get_parts(taut(route, roomy).difference(free))[0], water.water)
+
+
+def _in_water(leg: LineString, water: Polygon) -> Access:
+    near = _beside_line(leg).intersection(water)
+    return Access(shapely.get_coordinates(leg), beside=near.buffer(ROUNDING_M))
+
+
+def _beside_line(leg: LineString) -> Polygon:
+    return leg.buffer(OPENING * leg.length + ROUNDING_M)
 
 
 def joined(
@@ -137,7 +145,7 @@ def joined(
     launch, recovery
         How the two points are reached.
     passable
-        The free space, which only the legs may leave, and the water, which only legs from ashore may leave.
+        The free space, which only the legs may leave.
     opening_m
         Width of the ring's opening at most; it is a tenth of the shorter leg, and halved until the legs fit
         through without a crossing.
@@ -151,13 +159,13 @@ def joined(
     Internal
         No opening gives a simple path: a fault of the construction.
     """
-    lengths = [leg.line.length / 10 for leg in (launch, recovery) if leg.line.length > ROUNDING_M]
+    lengths = [OPENING * leg.line.length for leg in (launch, recovery) if leg.line.length > ROUNDING_M]
     opening_m = min([opening_m, region.exterior.length / 8, *lengths])
+    allowed = launch.beside.union(recovery.beside)
     for _ in range(HALVINGS):
-        allowed = [_corridor(leg, passable.water_and_rounding, opening_m) for leg in (launch, recovery)]
         for path in _candidates(region, launch, recovery, passable, opening_m, detail_m):
             legs = passable.outside(path)
-            if is_plainly_simple(path) and legs.difference(shapely.union_all(allowed)).length < ROUNDING_M:
+            if is_plainly_simple(path) and legs.difference(allowed).length < ROUNDING_M:
                 return path
         # Another detail makes another triangulation, whose way may keep clear of what this one touched.
         opening_m, detail_m = opening_m / 2, detail_m * OTHER_DETAIL
@@ -170,12 +178,6 @@ def joined(
 def is_plainly_simple(path: LineString) -> bool:
     """Simple, and not by rounding alone: still so when turned."""
     return bool(path.is_simple and rotate(path, 1.0, use_radians=True).is_simple)
-
-
-def _corridor(leg: Access, water: BaseGeometry, width_m: float) -> BaseGeometry:
-    """Where a leg and its way back may run."""
-    beside = leg.line.buffer(width_m)
-    return beside if leg.ashore else beside.intersection(water)
 
 
 def _candidates(

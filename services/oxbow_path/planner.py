@@ -148,7 +148,7 @@ def _waters(request: PathRequest, spacing_m: float) -> Waters:
         spacing_m=spacing_m,
         cells=request.decomposition.cells,
         free=free,
-        passable=Passable(free, water),
+        passable=Passable(free),
         probe=Probe.over(free, PROBE_PITCH * spacing_m),
         routes=Routes(free, PROBE_PITCH * spacing_m),
         launch=access(tuple(launch), free, shore, where="LaunchPoint"),

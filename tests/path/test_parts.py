@@ -199,7 +199,7 @@ def test_a_leg_round_a_corner_stays_in_the_water():
 )
 def test_legs_join_the_ring(launch, recovery):
     region = REGION.union(box(10, 290, 100, 310)).union(box(900, 290, 990, 310)).union(box(490, 10, 510, 100))
-    path = joined(region, leg(launch), leg(recovery), Passable(FREE, WATER), opening_m=5.0, detail_m=50.0)
+    path = joined(region, leg(launch), leg(recovery), Passable(FREE), opening_m=5.0, detail_m=50.0)
     assert path.is_simple
     assert path.coords[0] == launch
     assert path.coords[-1] == recovery
@@ -214,7 +214,7 @@ def test_the_way_through_goes_round_an_enclosed_island():
     legs = [
         access(place, free, Routes(water, 50.0), where="LaunchPoint") for place in ((0.0, 300.0), (1000.0, 300.0))
     ]
-    path = joined(region, *legs, Passable(free, water), opening_m=5.0, detail_m=50.0)
+    path = joined(region, *legs, Passable(free), opening_m=5.0, detail_m=50.0)
     assert path.is_simple
     assert path.distance(Point(500, 300)) >= 59.9
 
