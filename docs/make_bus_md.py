@@ -43,6 +43,9 @@ from oxbow.contracts import (
     PathPlan,
     PathRequest,
     SpacingStep,
+    Variogram,
+    VariogramModel,
+    WeightedArea,
     any_introspection_key,
     layer_key,
     live_key,
@@ -184,7 +187,7 @@ EXAMPLES: dict[type[msgspec.Struct], msgspec.Struct] = {
     )
 }
 
-INNER = (DroppedPart, CriticalPoint, Cell, HeadingScore, SpacingStep, Layer)
+INNER = (DroppedPart, CriticalPoint, Cell, HeadingScore, WeightedArea, SpacingStep, Variogram, Layer)
 """Messages that only occur inside others, and need no example of their own."""
 
 
@@ -258,7 +261,14 @@ def _layers() -> Iterator[str]:
 
 
 def _closed_sets() -> str:
-    sets: tuple[type[enum.StrEnum], ...] = (Method, CriticalKind, MissionState, LayerKind, ErrorCode)
+    sets: tuple[type[enum.StrEnum], ...] = (
+        Method,
+        CriticalKind,
+        VariogramModel,
+        MissionState,
+        LayerKind,
+        ErrorCode,
+    )
     return _table(("type", "values"), [(f"`{kind.__name__}`", ", ".join(f"`{v}`" for v in kind)) for kind in sets])
 
 

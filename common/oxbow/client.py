@@ -50,6 +50,7 @@ class Options(TypedDict, total=False):
     seed: int
     heading_rad: float | None
     tolerance_m: float | None
+    time_limit_s: float | None
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,7 @@ def completed(
     record = PlanRecord(
         method=options.method,
         seed=options.seed,
+        time_limit_s=options.time_limit_s,
         heading_deg=math.degrees(decomposition.heading_rad),
         spacing_m=plan.spacing_m,
         length_m=length_m,

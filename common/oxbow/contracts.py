@@ -49,6 +49,9 @@ __all__ = [
     "PathRequest",
     "Place",
     "SpacingStep",
+    "Variogram",
+    "VariogramModel",
+    "WeightedArea",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -212,8 +215,23 @@ class Decomposition(Message, frozen=True, kw_only=True):
 # --------------------------------------------------------------------------- path
 
 
+class WeightedArea(Message, frozen=True, kw_only=True):
+    """Where sampling is `weight` times as important as elsewhere, where the weight is 1."""
+
+    area: Polygon
+    weight: float
+
+    def __post_init__(self) -> None:
+        require_area(self, "area")
+        require_finite(self, "weight", least=0.0)
+
+
 class PathRequest(Message, frozen=True, kw_only=True):
-    """What a path must keep to: the water, its cells, the longest length, the least spacing."""
+    """What a path must keep to: the water, its cells, the longest length, the least spacing.
+
+    `weighted_areas` do not overlap, and may reach beyond the water. `time_limit_s` is what may be spent on
+    improving the path; without it the work is fixed, and the same request gives the same path everywhere.
+    """
 
     method: Method = Method.TRANSECT
     space: FreeSpace
@@ -223,9 +241,11 @@ class PathRequest(Message, frozen=True, kw_only=True):
     length_m: float
     min_spacing_m: float = 0.0
     seed: int = 0
+    weighted_areas: tuple[WeightedArea, ...] = ()
+    time_limit_s: float | None = None
 
     def __post_init__(self) -> None:
-        require_finite(self, "length_m", above=0.0)
+        require_finite(self, "length_m", "time_limit_s", above=0.0)
         require_finite(self, "min_spacing_m", least=0.0)
 
 
@@ -249,6 +269,35 @@ class PathPlan(Message, frozen=True, kw_only=True):
 # --------------------------------------------------------------------------- certificate
 
 
+class VariogramModel(enum.StrEnum):
+    """How the values of a field at two places differ, by their distance."""
+
+    EXPONENTIAL = "exponential"
+    SPHERICAL = "spherical"
+    GAUSSIAN = "gaussian"
+    MATERN32 = "matern32"
+
+
+class Variogram(Message, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A stationary and isotropic model of a field: half the mean squared difference of two places' values.
+
+    It rises from `nugget`, by which places right beside one another differ, to `sill`, by which places far apart
+    do (the nugget included); both are in the squared unit of the field. Within `range_m`, 95 % of that rise is done,
+    all of it in the spherical model. `matern32` is Matern's model of smoothness 3/2.
+    """
+
+    model: VariogramModel
+    range_m: float
+    sill: float
+    nugget: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_finite(self, "range_m", "sill", above=0.0)
+        require_finite(self, "nugget", least=0.0)
+        if self.nugget >= self.sill:
+            raise InvalidMission(f"is {self.nugget!r}; expected less than the sill, {self.sill!r}", where="nugget")
+
+
 class CertifyRequest(Message, frozen=True, kw_only=True):
     """A path to judge against the mission itself: the true outline and zones, not the planner's free space."""
 
@@ -259,6 +308,7 @@ class CertifyRequest(Message, frozen=True, kw_only=True):
     launch: Place
     recovery: Place
     speed_mps: float = 1.0
+    variogram: Variogram | None = None
 
     def __post_init__(self) -> None:
         require_area(self, "outline")
@@ -275,6 +325,7 @@ class Measures(Message, frozen=True, kw_only=True):
 
     `cover_radius_m` are certified (low, high) bounds of the largest distance from a point of the free space to
     the path (report, section 1.2.1, MinMax); `least_radius_m` is the least any path of that length could reach.
+    The kriging variances, shares of the sill, are there where a variogram is.
     """
 
     length_m: float
@@ -294,6 +345,8 @@ class Measures(Message, frozen=True, kw_only=True):
     p95_distance_m: float
     mean_ratio: float
     p95_ratio: float
+    kriging_variance_mean: float | None = None
+    kriging_variance_max: float | None = None
 
 
 class Certificate(Measures, frozen=True, kw_only=True):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
-import numpy as np
 import shapely
 
 from oxbow.contracts import MAX_REQUEST_BYTES, FloatArray
+from oxbow.coordinates import GivenPolygon, lonlat_of, require_wgs84
 from oxbow.errors import InvalidMission
 from oxbow.frame import Frame, Position
 from oxbow.mission import Bloom, Mission, MissionType
@@ -20,10 +20,6 @@ from oxbow.strict_json import decode_json
 __all__ = ["mission_from_geojson"]
 
 DOCUMENT = "GeoJSON"
-WGS84_NAMES = ("CRS84", "EPSG:4326", "EPSG::4326")
-
-_Point = Annotated[list[float], msgspec.Meta(min_length=2)]
-_Rings = Annotated[list[list[_Point]], msgspec.Meta(min_length=1)]
 
 
 class _AreaKind(enum.StrEnum):
@@ -125,7 +121,7 @@ def _areas(data: bytes) -> list[_Area]:
     if len(data) > MAX_REQUEST_BYTES:
         raise InvalidMission(f"is {len(data)} bytes; expected at most {MAX_REQUEST_BYTES}", where=DOCUMENT)
     head = decode_json(data, _Head, DOCUMENT)
-    _require_wgs84(head.crs)
+    require_wgs84(head.crs)
     match head.type:
         case _Kind.FEATURE_COLLECTION:
             features = decode_json(data, _Collection, DOCUMENT).features
@@ -148,9 +144,9 @@ def _of_feature(feature: _Feature, prefix: str) -> list[_Area]:
 def _of_geometry(geometry: _Geometry, prefix: str, name: str | None) -> list[_Area]:
     place, coordinates = f"{prefix}coordinates", bytes(geometry.coordinates)
     if geometry.type is _AreaKind.POLYGON:
-        rings = decode_json(coordinates, _Rings, DOCUMENT, at=place)
+        rings = decode_json(coordinates, GivenPolygon, DOCUMENT, at=place)
         return [_area(place, rings, name)]
-    polygons = decode_json(coordinates, list[_Rings], DOCUMENT, at=place)
+    polygons = decode_json(coordinates, list[GivenPolygon], DOCUMENT, at=place)
     return [_area(f"{place}[{index}]", rings, name) for index, rings in enumerate(polygons)]
 
 
@@ -159,23 +155,9 @@ def _area(place: str, rings: list[list[list[float]]], name: str | None) -> _Area
 
 
 def _ring(place: str, points: list[list[float]]) -> FloatArray:
-    """A ring in degrees, less its closing point, and less heights where it has any."""
-    degrees = np.array([point[:2] for point in points], dtype=np.float64).reshape(-1, 2)
-    wrong = (np.abs(degrees) > (360.0, 90.0)).any(axis=1)
-    if wrong.any():
-        index = int(np.argmax(wrong))
-        raise InvalidMission(
-            f"is {points[index][:2]}; expected [longitude, latitude] in WGS84 degrees (projected metres, or"
-            " latitude before longitude?)",
-            where=f"{place}[{index}]",
-        )
+    """A ring in degrees, less its closing point."""
+    degrees = lonlat_of(points, place)
     return degrees[:-1] if len(degrees) > 1 and (degrees[0] == degrees[-1]).all() else degrees
-
-
-def _require_wgs84(crs: Any) -> None:
-    """GeoJSON is WGS84; files older than RFC 7946 may say otherwise in a `crs` member."""
-    if crs is not None and not any(name in str(crs) for name in WGS84_NAMES):
-        raise InvalidMission(f"is {crs}; expected WGS84 degrees (no crs, or CRS84)", where="crs")
 
 
 def _chosen(areas: list[_Area], part: int | None) -> _Area:

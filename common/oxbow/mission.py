@@ -14,12 +14,13 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from oxbow.contracts import MAX_REQUEST_BYTES
+from oxbow.contracts import MAX_REQUEST_BYTES, Variogram
 from oxbow.errors import InvalidMission
 from oxbow.files import read_bytes, write_atomically
 from oxbow.frame import Position, lonlat
 from oxbow.plan import PlanOptions, PlanRecord
-from oxbow.strict_json import decode_json
+from oxbow.prior import PriorModel, parse_prior, prior_document
+from oxbow.strict_json import decode_json, gathered
 
 __all__ = [
     "Bloom",
@@ -73,6 +74,7 @@ _JSON_NAMES = {
     "slave_length_m": "Slave_length",
     "safety_m": "Safety",
     "minimal_spatial_rate_m": "Minimal_spatial_rate",
+    "prior_model": "PriorModel",
     "master_path": "Master_Path",
     "slave_path": "Slave_Path",
     "plan": "Plan",
@@ -111,6 +113,8 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
         Least distance from the outline and the zones.
     minimal_spatial_rate_m
         Least distance between parallel segments of the path; absent: as close as the length allows.
+    prior_model
+        What is known of the field beforehand.
     extra
         Fields without a meaning here, kept as they came.
     """
@@ -128,6 +132,7 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
     slave_length_m: float = 15_000.0
     safety_m: float = 0.0
     minimal_spatial_rate_m: float | None = None
+    prior_model: PriorModel | None = None
     master_path: tuple[Position, ...] | None = None
     slave_path: tuple[Position, ...] | None = None
     plan: PlanRecord | None = None
@@ -150,6 +155,11 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
         if clash := FIELD_NAMES & self.extra.keys():
             raise InvalidMission("is a field of the Mission File, not an extra one", where=min(clash))
         self._check_positions()
+
+    @property
+    def variogram(self) -> Variogram | None:
+        """How the field varies from place to place, where that is known."""
+        return None if self.prior_model is None else self.prior_model.variogram
 
     def _check_positions(self) -> None:
         _require_degrees("LaunchPoint", (self.launch,), indexed=False)
@@ -203,29 +213,24 @@ def parse_mission(data: bytes) -> Mission:
     """
     if len(data) > MAX_REQUEST_BYTES:
         raise InvalidMission(f"is {len(data)} bytes; expected at most {MAX_REQUEST_BYTES}", where="Mission File")
-    document = _gathered(decode_json(data, dict[str, msgspec.Raw], "Mission File"), FIELD_NAMES)
+    document = gathered(decode_json(data, dict[str, msgspec.Raw], "Mission File"), FIELD_NAMES)
     names = [name for name in OutlineName if name in document]
     if len(names) > 1:
         raise InvalidMission("is given beside BoundingBox, its newer name; expected one of them", where="InBox")
     if "Bloom" in document and bytes(document["Bloom"]).startswith(b"{"):
-        bloom = _gathered(decode_json(bytes(document["Bloom"]), dict[str, msgspec.Raw], "Bloom"), _BLOOM_NAMES)
+        bloom = gathered(decode_json(bytes(document["Bloom"]), dict[str, msgspec.Raw], "Bloom"), _BLOOM_NAMES)
         document["Bloom"] = msgspec.Raw(msgspec.json.encode(bloom))
     if names:
         document["BoundingBox"] = document.pop(names[0])
         document["outline_name"] = msgspec.Raw(msgspec.json.encode(names[0]))
+    prior = document.pop("PriorModel", None)
     try:
-        return decode_json(msgspec.json.encode(document), Mission, "Mission File")
+        mission = decode_json(msgspec.json.encode(document), Mission, "Mission File")
     except InvalidMission as error:
         if names == [OutlineName.IN_BOX] and error.where.startswith("BoundingBox"):
             raise InvalidMission(error.message, error.where.replace("BoundingBox", "InBox", 1)) from error
         raise
-
-
-def _gathered(document: dict[str, msgspec.Raw], known: frozenset[str]) -> dict[str, msgspec.Raw]:
-    """The known fields of a JSON object, less those that are null, and all others together under `extra`."""
-    fields = {name: raw for name, raw in document.items() if name in known and bytes(raw) != b"null"}
-    extra = {name: raw for name, raw in document.items() if name not in known}
-    return fields | {"extra": msgspec.Raw(msgspec.json.encode(extra))}
+    return mission if prior is None else msgspec.structs.replace(mission, prior_model=parse_prior(bytes(prior)))
 
 
 def mission_json(mission: Mission) -> bytes:
@@ -233,6 +238,8 @@ def mission_json(mission: Mission) -> bytes:
     given = {json: getattr(mission, field) for field, json in _JSON_NAMES.items()}
     outputs = {name: given.pop(name) for name in ("Master_Path", "Slave_Path", "Plan")}
     outline = given.pop("BoundingBox")
+    if mission.prior_model is not None:
+        given["PriorModel"] = prior_document(mission.prior_model)
     if mission.bloom is not None:
         bloom = mission.bloom
         given["Bloom"] = {"Sensor": bloom.sensor, "Value": bloom.value} | bloom.extra

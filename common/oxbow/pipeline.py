@@ -82,6 +82,8 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
             length_m=mission.master_length_m,
             min_spacing_m=mission.minimal_spatial_rate_m or 0.0,
             seed=options.seed,
+            weighted_areas=site.weighted_areas,
+            time_limit_s=options.time_limit_s,
         ),
     )
     certificate = call(
@@ -94,6 +96,7 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
             launch=site.launch,
             recovery=site.recovery,
             speed_mps=mission.master_speed_mps,
+            variogram=mission.variogram,
         ),
     )
     return completed(mission, options, site, space, decomposition, plan, certificate)

@@ -10,10 +10,11 @@ import numpy as np
 import shapely
 from shapely import LineString, Point, Polygon
 
-from oxbow.contracts import FloatArray, Place
+from oxbow.contracts import FloatArray, Place, WeightedArea
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.frame import Frame, Position, lonlat
 from oxbow.mission import Mission
+from oxbow.weights import weighted_areas
 
 __all__ = ["Site"]
 
@@ -39,6 +40,8 @@ class Site:
     nominal_spacing_m
         Water area / greatest length (Rendas and Li 2016, section 1.2.1.1, step 5), or the mission's least
         spacing where that is more.
+    weighted_areas
+        Where sampling is more or less important than elsewhere.
     warnings
         What the mission's author should know.
     """
@@ -49,6 +52,7 @@ class Site:
     launch: Place
     recovery: Place
     nominal_spacing_m: float
+    weighted_areas: tuple[WeightedArea, ...] = ()
     warnings: tuple[str, ...] = ()
 
     @classmethod
@@ -70,6 +74,7 @@ class Site:
         water = outline.difference(shapely.union_all(zones)) if zones else outline
         if water.area == 0.0:
             raise Infeasible("cover all of the water; nothing is left to plan on", where="ForbiddenZones")
+        areas = () if mission.prior_model is None else weighted_areas(mission.prior_model, frame, outline)
         return cls(
             frame=frame,
             outline=outline,
@@ -77,7 +82,8 @@ class Site:
             launch=_place("LaunchPoint", mission.launch, frame, outline),
             recovery=_place("RecoveryPoint", mission.recovery or mission.launch, frame, outline),
             nominal_spacing_m=max(water.area / mission.master_length_m, mission.minimal_spatial_rate_m or 0.0),
-            warnings=warnings,
+            weighted_areas=areas,
+            warnings=warnings + _prior_warnings(mission, areas),
         )
 
 
@@ -163,6 +169,13 @@ def _zones(mission: Mission, frame: Frame, outline: Polygon) -> tuple[tuple[Poly
             continue
         zones += parts
     return tuple(zones), tuple(warnings)
+
+
+def _prior_warnings(mission: Mission, areas: tuple[WeightedArea, ...]) -> tuple[str, ...]:
+    features = () if mission.prior_model is None else mission.prior_model.features
+    if areas or all(feature.weight is None for feature in features):
+        return ()
+    return (f"PriorModel has no weight other than 1 inside {mission.outline_name}: its weights change nothing",)
 
 
 def _enclosed(zone: Polygon) -> list[Polygon]:

@@ -11,7 +11,7 @@ from msgspec import inspect
 
 from oxbow.errors import InvalidMission
 
-__all__ = ["decode_json"]
+__all__ = ["decode_json", "gathered"]
 
 T = TypeVar("T")
 
@@ -52,6 +52,13 @@ def decode_json(data: bytes, kind: type[T], name: str, *, at: str = "") -> T:
         raise InvalidMission("is not JSON: a string is not UTF-8", where=name) from error
     except RecursionError as error:
         raise InvalidMission("is nested too deeply to be read", where=name) from error
+
+
+def gathered(document: dict[str, msgspec.Raw], known: frozenset[str]) -> dict[str, msgspec.Raw]:
+    """The known fields of a JSON object, less those that are null, and all others together under `extra`."""
+    fields = {name: raw for name, raw in document.items() if name in known and bytes(raw) != b"null"}
+    extra = {name: raw for name, raw in document.items() if name not in known}
+    return fields | {"extra": msgspec.Raw(msgspec.json.encode(extra))}
 
 
 def _located(problem: str, data: bytes) -> str:

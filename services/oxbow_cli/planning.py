@@ -77,6 +77,7 @@ def plan_on(job: Job, endpoint: str) -> Planned:
             method=options.method,
             seed=options.seed,
             heading_rad=options.heading_rad,
+            time_limit_s=options.time_limit_s,
         )
     return Planned(planned)
 
