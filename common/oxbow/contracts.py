@@ -282,8 +282,8 @@ class Variogram(Message, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A stationary and isotropic model of a field: half the mean squared difference of two places' values.
 
     It rises from `nugget`, by which places right beside one another differ, to `sill`, by which places far apart
-    do (the nugget included); both are in the squared unit of the field. Within `range_m`, 95 % of that rise is done,
-    all of it in the spherical model. `matern32` is Matern's model of smoothness 3/2.
+    do (the nugget included); both are in the squared unit of the field. Within `range_m`, 95 % of that rise is
+    done, in the spherical model all of it. `matern32` is Matern's model of smoothness 3/2.
     """
 
     model: VariogramModel
