@@ -144,6 +144,13 @@ EXAMPLES: dict[type[msgspec.Struct], msgspec.Struct] = {
             p95_distance_m=19.0,
             mean_ratio=2.4,
             p95_ratio=3.0,
+            p99_distance_m=21.3,
+            p99_ratio=3.3,
+            least_leg_distance_m=45.0,
+            discrepancy=0.09,
+            discrepancy_ratio=0.76,
+            directional_evenness=0.5,
+            turns=5,
             worst_gap=(27.5, 30.0),
         ),
         MissionStatus(

@@ -325,7 +325,9 @@ class Measures(Message, frozen=True, kw_only=True):
 
     `cover_radius_m` are certified (low, high) bounds of the largest distance from a point of the free space to
     the path (report, section 1.2.1, MinMax); `least_radius_m` is the least any path of that length could reach.
-    The kriging variances, shares of the sill, are there where a variogram is.
+    The kriging variances, shares of the sill, are there where a variogram is. `least_leg_distance_m` (MaxMin) is
+    None where no two legs are parallel, the discrepancy where the path keeps outside the free space; and all that
+    may be None is so in plans of earlier versions.
     """
 
     length_m: float
@@ -345,6 +347,13 @@ class Measures(Message, frozen=True, kw_only=True):
     p95_distance_m: float
     mean_ratio: float
     p95_ratio: float
+    p99_distance_m: float | None = None
+    p99_ratio: float | None = None
+    least_leg_distance_m: float | None = None
+    discrepancy: float | None = None
+    discrepancy_ratio: float | None = None
+    directional_evenness: float | None = None
+    turns: int | None = None
     kriging_variance_mean: float | None = None
     kriging_variance_max: float | None = None
 

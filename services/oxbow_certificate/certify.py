@@ -7,9 +7,12 @@ from dataclasses import dataclass
 import shapely
 
 from oxbow.contracts import Certificate, CertifyRequest
-from oxbow_certificate.conformance import count_crossings, outside_length, unsafe_length
+from oxbow_certificate.conformance import about_ends, count_crossings, outside_length, unsafe_length
 from oxbow_certificate.cover import CoverRadius, cover_radius, least_radius
+from oxbow_certificate.discrepancy import discrepancy
 from oxbow_certificate.distance import PathDistance
+from oxbow_certificate.headings import count_turns, directional_evenness
+from oxbow_certificate.legs import least_leg_distance
 from oxbow_certificate.region import JudgedSpace
 from oxbow_certificate.spread import DistanceSpread, distance_spread
 
@@ -48,7 +51,11 @@ def judge(request: CertifyRequest) -> Judgement:
     cover = cover_radius(space.judged, distance)
     spread = distance_spread(space.judged, distance)
     least_m = least_radius(space.judged.area, path.length)
+    spacing_m = 2.0 * least_m
+    ends = (request.launch, request.recovery)
     crossings = count_crossings(path)
+    positions = discrepancy(space.judged, path, spacing_m, 2.0 * space.detail_m)
+    meeting_legs = about_ends(space, ends, max(2.0 * request.safety_m, spacing_m))
     certificate = Certificate(
         length_m=path.length,
         duration_s=path.length / request.speed_mps,
@@ -56,7 +63,7 @@ def judge(request: CertifyRequest) -> Judgement:
         is_simple=crossings == 0,
         crossings=crossings,
         outside_m=outside_length(path, space),
-        unsafe_m=unsafe_length(path, space, request.safety_m, (request.launch, request.recovery)),
+        unsafe_m=unsafe_length(path, space, request.safety_m, ends),
         components=len(space.free.geoms),
         free_area_m2=space.free.area,
         judged_area=space.judged_area,
@@ -67,6 +74,13 @@ def judge(request: CertifyRequest) -> Judgement:
         p95_distance_m=spread.p95_m,
         mean_ratio=spread.mean_m / (least_m / 2),
         p95_ratio=spread.p95_m / least_m,
+        p99_distance_m=spread.p99_m,
+        p99_ratio=spread.p99_m / least_m,
+        least_leg_distance_m=least_leg_distance(path, spacing_m, meeting_legs),
+        discrepancy=positions.value if positions else None,
+        discrepancy_ratio=positions.ratio if positions else None,
+        directional_evenness=directional_evenness(path),
+        turns=count_turns(path, least_m),
         worst_gap=cover.place,
     )
     return Judgement(certificate, space, cover, spread)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
-from shapely import LineString, MultiLineString, Point, STRtree
+from shapely import LineString, MultiLineString, STRtree
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import Place
@@ -14,7 +14,7 @@ from oxbow_certificate.distance import segments_of
 from oxbow_certificate.erosion import eroded
 from oxbow_certificate.region import JudgedSpace
 
-__all__ = ["count_crossings", "outside_length", "unsafe_length"]
+__all__ = ["about_ends", "count_crossings", "outside_length", "unsafe_length"]
 
 SHORE_TOLERANCE_M = 0.01
 """A path this near to the shore is on it: degrees of seven decimals are a centimetre."""
@@ -53,20 +53,24 @@ def outside_length(path: LineString, space: JudgedSpace) -> float:
 
 
 def unsafe_length(path: LineString, space: JudgedSpace, safety_m: float, ends: Sequence[Place]) -> float:
-    """Metres of `path` nearer to the shore or a zone than the safety distance.
-
-    The legs to `ends`, the launch and recovery points, are excused: a point ashore can only be reached through
-    unsafe water. A leg may wander, within one and a half times its least length and two safety distances.
-    """
+    """Metres of `path` nearer to the shore or a zone than the safety distance, `about_ends` excused."""
     if safety_m == 0:
         return 0.0
-    excused = [
-        place.buffer(2.0 * safety_m + 1.5 * place.distance(space.free)) for place in (Point(end) for end in ends)
-    ]
-    unexcused = _beyond(path, shapely.union_all([space.free, *excused]))
+    unexcused = _beyond(path, shapely.union_all([space.free, about_ends(space, ends, 2.0 * safety_m)]))
     if unexcused.length == 0:
         return 0.0
     return float(_beyond(unexcused, eroded(space.water, SAFETY_SHARE * safety_m, space.detail_m)).length)
+
+
+def about_ends(space: JudgedSpace, ends: Sequence[Place], margin_m: float) -> BaseGeometry:
+    """Where a path may do as it must to reach `ends`, the launch and recovery points.
+
+    A point ashore can only be reached through unsafe water. A leg may wander, within one and a half times its
+    least length and a margin.
+    """
+    points = shapely.points(ends)
+    radius_m = margin_m + 1.5 * shapely.distance(points, space.free)
+    return shapely.union_all(shapely.buffer(points, radius_m, quad_segs=16))
 
 
 def _beyond(lines: BaseGeometry, region: BaseGeometry) -> BaseGeometry:

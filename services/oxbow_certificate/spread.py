@@ -34,6 +34,11 @@ class DistanceSpread:
         """The distance that 95 % of the area is within."""
         return float(np.quantile(self.distance_m, 0.95))
 
+    @property
+    def p99_m(self) -> float:
+        """The distance that 99 % of the area is within."""
+        return float(np.quantile(self.distance_m, 0.99))
+
 
 def distance_spread(region: MultiPolygon, distance: PathDistance, *, count: int = 32_000) -> DistanceSpread:
     """Distance to a path at `count` places of `region`."""

@@ -1,0 +1,148 @@
+"""Discrepancy of the positions that a path samples: their distance from uniformity over a region."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from scipy.stats import qmc
+from shapely import LineString, MultiPolygon
+
+from oxbow.contracts import FloatArray
+
+__all__ = ["Discrepancy", "discrepancy", "unit_square"]
+
+_MOST_POSITIONS = 4_000
+
+
+class _Edges(NamedTuple):
+    """Edges by their west and their east end (n, 2); `sign` is 1 above the region's inside, -1 below it."""
+
+    west: FloatArray
+    east: FloatArray
+    sign: FloatArray
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """Centred L2 discrepancy, and the same as a share of what as many random positions are expected to have."""
+
+    value: float
+    ratio: float
+
+
+def discrepancy(
+    region: MultiPolygon, path: LineString, spacing_m: float, tolerance_m: float
+) -> Discrepancy | None:
+    """Discrepancy of a path's positions in a region (Rendas and Li 2016, section 1.2.1, entropy/discrepancy).
+
+    The positions are at equal intervals of `spacing_m`, or longer ones where there would be more than 4 000. They
+    are brought to the unit square by `unit_square`, along the long side of the region's least rectangle, and their
+    centred discrepancy (Hickernell 1998) is taken there. It is the same for mirrored and swapped axes, so that it
+    does not change where region and path are turned together.
+
+    Parameters
+    ----------
+    region
+        Where positions should be uniform; those farther from it than `tolerance_m` are left out.
+
+    Returns
+    -------
+    Discrepancy or None
+        None where no position is in the region.
+    """
+    positions = _positions(path, min(math.ceil(path.length / spacing_m), _MOST_POSITIONS))
+    shapely.prepare(region)
+    positions = positions[shapely.dwithin(region, shapely.points(positions), tolerance_m)]
+    along = _long_side(region)
+    upright = shapely.transform(region, lambda xy: _turned(xy, along))
+    square = unit_square(upright, _turned(positions, along))
+    if not len(square):
+        return None
+    squared = float(qmc.discrepancy(square, method="CD"))
+    # The mean of the kernel prod(1 + |x - 1/2|) less that over independent pairs: (5/4)^2 - (13/12)^2.
+    expected = 7 / 18 / len(square)
+    return Discrepancy(math.sqrt(squared), math.sqrt(squared / expected))
+
+
+def unit_square(region: MultiPolygon, places: FloatArray) -> FloatArray:
+    """Map places of a region to the unit square, so that equal areas become equal areas (Rosenblatt 1952).
+
+    The first coordinate is the share of the region's area west of a place; the second is the share of the upright
+    line through it, as far as that runs in the region, south of the place. What is uniform on the region becomes
+    uniform on the square, whatever the region's shape, and on an upright rectangle the map is a scaling. Places
+    beside the region count as on its border.
+
+    Parameters
+    ----------
+    region
+        Of positive area.
+    places : (n, 2)
+
+    Returns
+    -------
+    (m, 2)
+        In the order of their first coordinate; without those at a gap between parts, m < n.
+    """
+    west, east, sign = _edges(region)
+    inner = np.clip(places[:, 0], west[:, 0].min(), np.nextafter(east[:, 0].max(), -np.inf))
+    order = np.argsort(inner, kind="stable")
+    x, y = inner[order], places[order, 1]
+    # Each edge meets the upright lines of places first[e] <= place < last[e].
+    first, last = np.searchsorted(x, west[:, 0]), np.searchsorted(x, east[:, 0])
+    edge = np.repeat(np.arange(len(first)), last - first)
+    place = np.arange(len(edge)) - np.repeat(np.cumsum(last - first) - last, last - first)
+    ahead = x[place] - west[edge, 0]
+    slope = (east[:, 1] - west[:, 1]) / (east[:, 0] - west[:, 0])
+    height = west[edge, 1] + slope[edge] * ahead
+
+    def total(of_meetings: FloatArray) -> FloatArray:
+        return np.bincount(place, sign[edge] * of_meetings, minlength=len(x)).astype(np.float64)
+
+    chord, south = total(height), total(np.minimum(height, y[place]))
+    under = sign * (east[:, 0] - west[:, 0]) * (east[:, 1] + west[:, 1]) / 2
+    passed = np.concatenate([[0.0], np.cumsum(under[np.argsort(east[:, 0])])])
+    area_west = passed[np.searchsorted(np.sort(east[:, 0]), x, side="right")]
+    area_west += total(ahead * (west[edge, 1] + height) / 2)
+    met = chord > 0
+    square = np.column_stack([area_west[met] / region.area, south[met] / chord[met]])
+    return np.clip(square, 0.0, 1.0)
+
+
+def _edges(region: MultiPolygon) -> _Edges:
+    """The edges of `region` that are not upright."""
+    rings = shapely.get_rings(shapely.get_parts(shapely.orient_polygons(region)))
+    xy, ring = shapely.get_coordinates(rings, return_index=True)
+    start, end = xy[:-1], xy[1:]
+    kept = (ring[:-1] == ring[1:]) & (start[:, 0] != end[:, 0])
+    start, end = start[kept], end[kept]
+    eastward = (start[:, 0] < end[:, 0])[:, None]
+    # The region lies to the left of its edges: above one that runs east.
+    return _Edges(
+        np.where(eastward, start, end), np.where(eastward, end, start), np.where(eastward[:, 0], -1.0, 1.0)
+    )
+
+
+def _positions(path: LineString, count: int) -> FloatArray:
+    """The middles (count, 2) of equal lengths of `path`."""
+    xy = shapely.get_coordinates(path)
+    at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
+    wanted = (np.arange(count) + 0.5) / count * at[-1]
+    return np.column_stack([np.interp(wanted, at, xy[:, axis]) for axis in (0, 1)])
+
+
+def _long_side(region: MultiPolygon) -> FloatArray:
+    """The direction (2,) of the longer side of the least rectangle about `region`."""
+    corners = shapely.get_coordinates(shapely.oriented_envelope(region))
+    sides = np.diff(corners[:3], axis=0)
+    longer = sides[np.argmax(np.hypot(*sides.T))]
+    return np.asarray(longer / np.hypot(*longer))
+
+
+def _turned(xy: FloatArray, along: FloatArray) -> FloatArray:
+    """Coordinates along a direction and to its left."""
+    east, north = along
+    return np.asarray(xy @ np.array([[east, -north], [north, east]]))

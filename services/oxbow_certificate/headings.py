@@ -1,0 +1,75 @@
+"""The headings of a path: whether one direction is sampled more than others, and how often the vehicle turns."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from shapely import LineString
+
+from oxbow.contracts import FloatArray
+
+__all__ = ["count_turns", "directional_evenness"]
+
+TURN_RAD = math.radians(45.0)
+"""The least change of heading that is a turn."""
+
+
+def directional_evenness(path: LineString) -> float:
+    """How evenly a path samples all directions: 0 for one direction, 1 for all alike.
+
+    Directions are headings without their sense, on a half circle, weighted by length. They are compared with
+    the uniform distribution by Watson's U^2 (Watson 1961), which does not depend on where the circle is cut: the
+    variance of the difference of the two distribution functions. It is 1/12 for one direction, and the figure is
+    1 - sqrt(12 U^2): for k directions sampled alike, evenly apart, 1 - 1/k.
+    """
+    steps = _steps(path)
+    length = np.hypot(*steps.T)
+    turned = np.arctan2(steps[:, 1], steps[:, 0]) / math.pi % 1.0
+    order = np.argsort(turned)
+    share = np.concatenate([[0.0], np.cumsum(length[order]) / length.sum()])
+    cuts = np.concatenate([[0.0], turned[order], [1.0]])
+    # Between two cuts the difference falls linearly, from `first` to `last`.
+    first, last = share - cuts[:-1], share - cuts[1:]
+    mean = np.sum(first**2 - last**2) / 2
+    watson = np.sum(first**3 - last**3) / 3 - mean**2
+    return 1.0 - math.sqrt(min(max(12 * watson, 0.0), 1.0))
+
+
+def count_turns(path: LineString, reach_m: float) -> int:
+    """Number of turns of a path: changes of heading by 45 degrees or more within `reach_m` metres of way.
+
+    The change is gathered, so that a round turn of many short segments is one turn, and a gentle curve is none,
+    however many vertices it has. Turning places to the same side, no more than `reach_m` apart, are one turn.
+    """
+    steps = _steps(path)
+    heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    corner_at = np.cumsum(np.hypot(*steps.T))[:-1]
+    return sum(_count_left_turns(side * heading, corner_at, reach_m) for side in (1.0, -1.0))
+
+
+def _count_left_turns(heading: FloatArray, corner_at: FloatArray, reach_m: float) -> int:
+    """Turns by which `heading` (n,) grows; `corner_at` (n - 1,) is how far along the path it changes."""
+    corners = np.arange(len(corner_at))
+    gathered = heading[1:] - _range_minimum(heading, np.searchsorted(corner_at, corner_at - reach_m), corners)
+    turning = corners[(gathered >= TURN_RAD) & (np.diff(heading) > 0)]
+    return int(len(turning) and 1 + np.count_nonzero(np.diff(corner_at[turning]) > reach_m))
+
+
+def _range_minimum(values: FloatArray, first: npt.NDArray[np.intp], last: npt.NDArray[np.intp]) -> FloatArray:
+    """Minimum of ``values[first : last + 1]`` for each pair, by runs of 2^k (Bender and Farach-Colton 2000)."""
+    least = np.empty(len(first))
+    level = np.frexp(last - first + 1)[1] - 1
+    for k in range(int(level.max(initial=-1)) + 1):
+        at = level == k
+        least[at] = np.minimum(values[first[at]], values[last[at] - 2**k + 1])
+        values = np.minimum(values[: -(2**k)], values[2**k :])
+    return least
+
+
+def _steps(path: LineString) -> FloatArray:
+    """The ways (n, 2) from each waypoint to the next, without those of no length."""
+    steps = np.diff(shapely.get_coordinates(path), axis=0)
+    return np.asarray(steps[steps.any(axis=1)])
