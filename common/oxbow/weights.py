@@ -20,6 +20,7 @@ __all__ = ["weighted_areas"]
 EDGE_DEG = 0.01
 """Edges are straight in degrees (RFC 7946, section 3.1.1): so short, they are so in the plane, within 2 cm."""
 MARGIN_DEG = 1e-3
+INTERIORS_MEET = "T********"
 
 
 def weighted_areas(prior: PriorModel, frame: Frame, outline: Polygon) -> tuple[WeightedArea, ...]:
@@ -40,9 +41,10 @@ def weighted_areas(prior: PriorModel, frame: Frame, outline: Polygon) -> tuple[W
         Areas of weights other than 1. They meet the outline, though they may reach beyond it, and do not overlap.
     """
     weighted = [feature for feature in prior.features if feature.weight is not None]
-    near = shapely.intersection([feature.geometry for feature in weighted], _surroundings(frame, outline))
-    weights = np.array([feature.weight for feature in weighted], dtype=np.float64)
-    in_degrees = _Weighted(near, weights).parts().painted().parts()
+    given = _Weighted(
+        np.array([feature.geometry for feature in weighted]), np.array([feature.weight for feature in weighted])
+    )
+    in_degrees = given.parts().clipped(_surroundings(frame, outline)).painted()
     in_plane = shapely.transform(shapely.segmentize(in_degrees.areas, EDGE_DEG), frame.to_planar)
     # Rounding may turn a needle inside out.
     planar = _Weighted(shapely.make_valid(in_plane), in_degrees.weights).parts()
@@ -80,12 +82,19 @@ class _Weighted:
         parts, owner_of_part = shapely.get_parts(parts, return_index=True)
         return _Weighted(parts, self.weights[owners[owner_of_part]]).where(shapely.area(parts) > 0)
 
+    def clipped(self, region: MultiPolygon) -> _Weighted:
+        """What of each area lies in a region."""
+        shapely.prepare(region)
+        meeting = self.where(shapely.intersects(region, self.areas))
+        return _Weighted(shapely.intersection(meeting.areas, region), meeting.weights).parts()
+
     def painted(self) -> _Weighted:
         """What is left of each area once those after it are painted over it, as layers of a map are."""
-        lower, upper = STRtree(self.areas).query(self.areas, predicate="intersects")
-        covers = (upper > lower) & ~shapely.touches(self.areas[lower], self.areas[upper])
+        pairs = STRtree(self.areas).query(self.areas)
+        lower, upper = pairs[:, pairs[1] > pairs[0]]
+        covers = shapely.relate_pattern(self.areas[lower], self.areas[upper], INTERIORS_MEET)
         lower, upper = lower[covers], upper[covers]
         areas = self.areas.copy()
         for index in np.unique(lower):
             areas[index] = areas[index].difference(shapely.union_all(self.areas[upper[lower == index]]))
-        return _Weighted(areas, self.weights)
+        return _Weighted(areas, self.weights).parts()

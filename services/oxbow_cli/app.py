@@ -63,7 +63,10 @@ def plan(
     file: MissionFile,
     method: Annotated[str, typer.Option(help="How to generate the path.")] = "Transect",
     prior: Annotated[
-        Path | None, typer.Option(help="A prior model of the bloom, for methods that use one.")
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Where sampling matters more: GeoJSON or a raster, in place of FILE's PriorModel."
+        ),
     ] = None,
     connect: Annotated[
         str | None, typer.Option(metavar="ENDPOINT", help="Plan on the stack that listens there.")
@@ -81,6 +84,14 @@ def plan(
     seed: Annotated[
         int, typer.Option(min=0, help="Of all that is random; the same seed gives the same plan.")
     ] = 0,
+    time_limit: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S",
+            min=0.001,
+            help="Improve the path for so many seconds at most, in place of a fixed amount of work.",
+        ),
+    ] = None,
     timeout: Annotated[float, typer.Option(metavar="S", min=0.001, help="Give up after so many seconds.")] = 120.0,
     home: Home = None,
     json: AsJson = False,
@@ -96,16 +107,17 @@ def plan(
     - `oxbow plan lake.json`: plan, complete the file, keep a recording
     - `oxbow plan lake.json -o planned.json --heading 45`
     - `oxbow plan lake.json --connect tcp/127.0.0.1:7447`: on a stack that `oxbow up` keeps running
+    - `oxbow plan lake.json --prior blooms.geojson --time-limit 10`
     """
     from oxbow.mission import read_mission
     from oxbow_cli import report
-    from oxbow_cli.arguments import endpoint, plan_options, require_compatible, save
+    from oxbow_cli.arguments import endpoint, plan_options, require_compatible, save, with_prior
     from oxbow_cli.home import recordings_folder
     from oxbow_cli.planning import Job, plan_embedded, plan_here, plan_on
 
-    require_compatible(local=local, connect=connect, record=record)
-    mission = read_mission(file)
-    options = plan_options(method, seed, heading, prior)
+    require_compatible(local=local, connect=connect, record=record, time_limit_s=time_limit, timeout_s=timeout)
+    mission = with_prior(read_mission(file), prior)
+    options = plan_options(method, seed, heading, time_limit)
     with report.progress_bar(shown=not json) as progress:
         job = Job(mission, options, timeout, progress)
         if local:

@@ -8,14 +8,26 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import msgspec
+
 from oxbow.bus import DEFAULT_ENDPOINT
 from oxbow.contracts import Method
 from oxbow.errors import InvalidMission
 from oxbow.frame import Position
 from oxbow.mission import Mission, write_mission
 from oxbow.plan import PlanOptions
+from oxbow.prior_file import read_prior
 
-__all__ = ["endpoint", "plan_options", "position", "replica_counts", "require_compatible", "save", "writing"]
+__all__ = [
+    "endpoint",
+    "plan_options",
+    "position",
+    "replica_counts",
+    "require_compatible",
+    "save",
+    "with_prior",
+    "writing",
+]
 
 
 _ENDPOINT = re.compile(r"[a-z][a-z0-9_-]*/\S+")
@@ -37,14 +49,17 @@ def position(text: str, where: str) -> Position:
     return Position(lat=lat, long=long)
 
 
-def plan_options(method: str, seed: int, heading_deg: float | None, prior: Path | None) -> PlanOptions:
-    """How to plan; refuses what no method that there is could use."""
+def plan_options(method: str, seed: int, heading_deg: float | None, time_limit_s: float | None) -> PlanOptions:
+    """How to plan."""
     if method not in set(Method):
         raise InvalidMission(f"is {method!r}; expected {' or '.join(Method)}", where="--method")
-    if prior is not None:
-        raise InvalidMission(f"is {str(prior)!r}; {method} plans without a prior model", where="--prior")
     heading_rad = None if heading_deg is None else math.radians(heading_deg)
-    return PlanOptions(method=Method(method), seed=seed, heading_rad=heading_rad)
+    return PlanOptions(method=Method(method), seed=seed, heading_rad=heading_rad, time_limit_s=time_limit_s)
+
+
+def with_prior(mission: Mission, prior: Path | None) -> Mission:
+    """The mission with the prior model of a file in place of its own, where there is such a file."""
+    return mission if prior is None else msgspec.structs.replace(mission, prior_model=read_prior(prior))
 
 
 def replica_counts(texts: Iterable[str]) -> dict[str, int]:
@@ -58,8 +73,14 @@ def replica_counts(texts: Iterable[str]) -> dict[str, int]:
     return counts
 
 
-def require_compatible(*, local: bool, connect: str | None, record: Path | None) -> None:
+def require_compatible(
+    *, local: bool, connect: str | None, record: Path | None, time_limit_s: float | None, timeout_s: float
+) -> None:
     """Refuse options that contradict one another."""
+    if time_limit_s is not None and time_limit_s >= timeout_s:
+        raise InvalidMission(
+            f"is {time_limit_s:g} s; expected less than --timeout, {timeout_s:g} s", "--time-limit"
+        )
     if local and connect is not None:
         raise InvalidMission("plans in this process; give one of --local and --connect", where="--local")
     if record is not None and (local or connect is not None):
