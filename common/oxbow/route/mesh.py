@@ -1,0 +1,172 @@
+"""Triangulated water: which triangles lie side by side, where places are, how far the shore is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from shapely import LineString, MultiPolygon, Polygon, STRtree
+from shapely.geometry.base import BaseGeometry
+
+from oxbow.contracts import FloatArray
+from oxbow.errors import Infeasible, InvalidMission
+from oxbow.route.triangulation import Indices, triangulated, twins_of
+
+__all__ = ["ROUNDING_M", "Mesh", "Touches", "cross", "following"]
+
+ROUNDING_M = 1e-6
+"""A place this near to the water is in it."""
+
+TOUCH_M = 1e-9
+"""A place this near to a triangle touches it."""
+
+
+@dataclass(frozen=True)
+class Touches:
+    """Which triangles places touch: pairs of a place and a triangle, two arrays of one length."""
+
+    place: Indices
+    triangle: Indices
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A constrained Delaunay triangulation of water, as sides of triangles.
+
+    Side s = 3 t + j of triangle t runs counterclockwise from its corner j to its corner j + 1, and is spoken of as
+    corner s where its tail is meant. What two triangles share are two sides, each other's twin.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (m, 2)
+        In metres.
+    corners : ndarray of int, shape (n, 3)
+        The vertices of each triangle, counterclockwise.
+    twins : ndarray of int, shape (n, 3)
+        Each side's twin, -1 where it is shore.
+    """
+
+    vertices: FloatArray
+    corners: Indices
+    twins: Indices
+
+    @classmethod
+    def of(cls, water: Polygon | MultiPolygon, outlines: Sequence[BaseGeometry] = ()) -> Mesh:
+        """Triangulate water; no triangle straddles the shore or one of the outlines.
+
+        Raises
+        ------
+        InvalidMission
+            The water is empty or not a valid polygon.
+        """
+        if water.is_empty or not water.is_valid:
+            raise InvalidMission("is empty or not a valid polygon", where="water")
+        vertices, corners = triangulated(water, outlines)
+        return cls(vertices, corners, twins_of(corners))
+
+    @cached_property
+    def tails(self) -> FloatArray:
+        """Where each side begins, shape (3 n, 2)."""
+        return np.asarray(self.vertices[self.corners.ravel()])
+
+    @cached_property
+    def heads(self) -> FloatArray:
+        """Where each side ends, shape (3 n, 2)."""
+        return np.asarray(self.vertices[np.roll(self.corners, -1, axis=1).ravel()])
+
+    @cached_property
+    def polygons(self) -> npt.NDArray[np.object_]:
+        """The triangles as polygons."""
+        return np.asarray(shapely.polygons(self.vertices[self.corners]))
+
+    @cached_property
+    def _index(self) -> STRtree:
+        return STRtree(self.polygons)
+
+    @cached_property
+    def shore(self) -> Indices:
+        """The sides that are shore."""
+        return np.flatnonzero(self.twins.ravel() < 0)
+
+    @cached_property
+    def _shore_index(self) -> STRtree:
+        ends = np.stack([self.tails[self.shore], self.heads[self.shore]], axis=1)
+        return STRtree(np.asarray(shapely.linestrings(ends)))
+
+    @cached_property
+    def sectors(self) -> Indices:
+        """Corners that are one place of the water have one number, shape (3 n,).
+
+        A vertex at which shores touch is several places: one for each part of the water round it.
+        """
+        twins = self.twins.ravel()
+        sides = np.flatnonzero(twins >= 0)
+        same = coo_array((np.ones(len(sides)), (sides, following(twins[sides]))), shape=(len(twins), len(twins)))
+        return np.asarray(connected_components(same, directed=False)[1], dtype=np.intp)
+
+    @cached_property
+    def angles(self) -> FloatArray:
+        """The water's angle at each sector, in radians."""
+        apexes = self.vertices[self.corners]
+        ahead = np.roll(apexes, -1, axis=1) - apexes
+        behind = np.roll(apexes, 1, axis=1) - apexes
+        angle = np.arctan2(cross(ahead, behind), (ahead * behind).sum(axis=2))
+        return np.bincount(self.sectors, angle.ravel())
+
+    def clearance_m(self, line: LineString) -> float:
+        """The least distance from a line to the shore."""
+        _, distance_m = self._shore_index.query_nearest(line, return_distance=True, all_matches=False)
+        return float(distance_m[0])
+
+    def touches(self, places: FloatArray, names: Sequence[str]) -> Touches:
+        """The triangles that each of some places touches.
+
+        Parameters
+        ----------
+        places : ndarray, shape (n, 2)
+            In metres.
+        names
+            What errors call them.
+
+        Raises
+        ------
+        InvalidMission
+            A place is not finite.
+        Infeasible
+            A place lies outside the water.
+        """
+        for number in np.flatnonzero(~np.isfinite(places).all(axis=1)):
+            raise InvalidMission(f"is {_text(places[number])}; expected finite metres", where=names[number])
+        points = np.asarray(shapely.points(places))
+        place, triangle = self._index.query(points, predicate="dwithin", distance=TOUCH_M)
+        for number in np.setdiff1d(np.arange(len(places)), place):
+            nearest, distance_m = self._index.query_nearest(points[number], return_distance=True)
+            if distance_m[0] > ROUNDING_M:
+                raise Infeasible(
+                    f"at {_text(places[number])} lies outside the water, {distance_m[0]:.3g} m from it;"
+                    " expected a place in the water, not ashore or on an island",
+                    where=names[number],
+                )
+            place = np.append(place, np.full(len(nearest), number))
+            triangle = np.append(triangle, nearest)
+        return Touches(place, triangle)
+
+
+def following(sides: Indices) -> Indices:
+    """The next sides of the same triangles."""
+    return np.asarray(sides + np.where(sides % 3 == 2, -2, 1))
+
+
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """a x b of plane vectors, over the last axis: positive where b lies to the left of a."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def _text(place: FloatArray) -> str:
+    return f"({place[0]:.6g}, {place[1]:.6g})"

@@ -1,0 +1,166 @@
+"""What a route is, and what every method of finding one offers."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+from shapely import LineString
+
+from oxbow.contracts import FloatArray
+from oxbow.errors import Infeasible, InvalidMission
+from oxbow.route.danger import Danger
+from oxbow.route.mesh import Mesh
+
+__all__ = [
+    "Route",
+    "RouteMethod",
+    "Router",
+    "as_matrix",
+    "checked_places",
+    "judged",
+    "place_names",
+    "require_way",
+]
+
+
+class RouteMethod(enum.StrEnum):
+    """A way to find routes."""
+
+    VISIBILITY = "visibility"
+    TESSELLATION = "tessellation"
+    FUNNEL = "funnel"
+    INCENTERS = "incenters"
+
+
+@dataclass(frozen=True)
+class Route:
+    """A way through the water.
+
+    Parameters
+    ----------
+    polyline : ndarray, shape (n, 2)
+        From start to goal, in metres.
+    length_m
+        Its length.
+    cost
+        In metres: the length, and what the danger on the way is worth (`Danger.costs` over its edges).
+    danger
+        The probability of harm on the way, 1 - prod(1 - P_k) over its edges.
+    clearance_m
+        Its least distance from the shore.
+    method
+        How it was found.
+    """
+
+    polyline: FloatArray
+    length_m: float
+    cost: float
+    danger: float
+    clearance_m: float
+    method: RouteMethod
+
+    @cached_property
+    def line(self) -> LineString:
+        """The polyline as geometry."""
+        return LineString(self.polyline)
+
+
+class Router(Protocol):
+    """Finds routes through one water."""
+
+    def route(self, start: npt.ArrayLike, goal: npt.ArrayLike) -> Route:
+        """The route from one place to another, both (x, y) in metres.
+
+        Raises
+        ------
+        Infeasible
+            Start or goal lies outside the water (`where` says which), or no water leads from one to the other.
+        """
+
+    def distances(self, points: npt.ArrayLike) -> FloatArray:
+        """Costs of the routes between all pairs of places, in metres; lengths, where there is no danger.
+
+        Parameters
+        ----------
+        points : array_like, shape (n, 2)
+            In metres.
+
+        Returns
+        -------
+        ndarray, shape (n, n)
+            Symmetric, 0 on the diagonal, inf where no water leads from one place to the other.
+
+        Raises
+        ------
+        Infeasible
+            A place lies outside the water; `where` is ``points[k]``.
+        """
+
+
+def judged(polyline: FloatArray, mesh: Mesh, danger: Danger, method: RouteMethod) -> Route:
+    """The route along a polyline, with its figures."""
+    polyline = _without_repeats(polyline)
+    starts, ends = polyline[:-1], polyline[1:]
+    at_start = danger.hazards_at(polyline[:1]).sum()
+    hazard = at_start + danger.hazards(starts, ends).sum()
+    return Route(
+        polyline=polyline,
+        length_m=float(np.hypot(*(ends - starts).T).sum()),
+        cost=float(danger.costs(starts, ends).sum() + danger.c_max_m * at_start),
+        danger=-math.expm1(-hazard),
+        clearance_m=mesh.clearance_m(LineString(polyline)),
+        method=method,
+    )
+
+
+def _without_repeats(polyline: FloatArray) -> FloatArray:
+    """A polyline without equal neighbours; two points at least."""
+    repeated = (polyline[1:] == polyline[:-1]).all(axis=1)
+    kept = polyline[np.concatenate([[True], ~repeated])]
+    return kept if len(kept) > 1 else np.vstack([kept, kept])
+
+
+def place_names(count: int) -> list[str]:
+    """What errors call the places of a distance matrix."""
+    return [f"points[{number}]" for number in range(count)]
+
+
+def checked_places(places: npt.ArrayLike) -> FloatArray:
+    """Places as an array of shape (n, 2).
+
+    Raises
+    ------
+    InvalidMission
+        They have another shape.
+    """
+    array = np.asarray(places, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 2:
+        raise InvalidMission(f"have shape {array.shape}; expected places of shape (n, 2)", where="points")
+    return array
+
+
+def require_way(cost: float, ends: FloatArray) -> None:
+    """Refuse a goal that no way leads to.
+
+    Raises
+    ------
+    Infeasible
+        The cost is infinite.
+    """
+    if not math.isfinite(cost):
+        start, goal = (f"({x:.6g}, {y:.6g})" for x, y in ends)
+        raise Infeasible(f"at {goal} is in other water than the start at {start}: no way leads there", "goal")
+
+
+def as_matrix(costs: FloatArray, points: FloatArray, danger: Danger) -> FloatArray:
+    """The symmetric matrix of the costs of ways between points; starting inside a danger zone costs as well."""
+    matrix = costs + danger.c_max_m * danger.hazards_at(points)[:, None]
+    matrix = np.minimum(matrix, matrix.T)
+    np.fill_diagonal(matrix, 0.0)
+    return matrix

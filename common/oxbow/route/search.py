@@ -1,0 +1,75 @@
+"""Cheapest ways over a network of places (E. W. Dijkstra 1959, through SciPy)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+
+from oxbow.contracts import FloatArray
+from oxbow.route.danger import Danger
+from oxbow.route.triangulation import Indices
+
+__all__ = ["Arcs", "Ways", "cheapest_ways", "distinct"]
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """One-way connections of numbered places, each pair at most once, with costs in metres."""
+
+    tails: Indices
+    heads: Indices
+    costs: FloatArray
+
+    @classmethod
+    def one_way(cls, places: FloatArray, tails: Indices, heads: Indices, danger: Danger) -> Arcs:
+        """Straight edges between places, shape (n, 2)."""
+        return cls(tails, heads, danger.costs(places[tails], places[heads]))
+
+    @classmethod
+    def both_ways(cls, places: FloatArray, pairs: Indices, danger: Danger) -> Arcs:
+        """Straight edges between pairs of places, shape (m, 2), there and back; a pair may occur repeatedly."""
+        low, high = distinct(pairs.min(axis=1), pairs.max(axis=1))
+        low, high = low[low < high], high[low < high]
+        return cls.one_way(places, np.concatenate([low, high]), np.concatenate([high, low]), danger)
+
+    def __add__(self, other: Arcs) -> Arcs:
+        return Arcs(
+            np.concatenate([self.tails, other.tails]),
+            np.concatenate([self.heads, other.heads]),
+            np.concatenate([self.costs, other.costs]),
+        )
+
+
+@dataclass(frozen=True)
+class Ways:
+    """The cheapest ways from some sources to all places: their costs, inf where none leads, and their last steps."""
+
+    costs: FloatArray
+    previous: Indices
+
+    def way(self, source: int, place: int) -> list[int]:
+        """The places on the way from a source, by its rank among the sources, to a place; both included."""
+        return list(self._backwards(source, place))[::-1]
+
+    def _backwards(self, source: int, place: int) -> Iterator[int]:
+        while place >= 0:
+            yield place
+            place = int(self.previous[source, place])
+
+
+def cheapest_ways(count: int, arcs: Arcs, sources: Indices) -> Ways:
+    """Search a network of `count` places from some of them."""
+    graph = coo_array((arcs.costs, (arcs.tails, arcs.heads)), shape=(count, count)).tocsr()
+    costs, previous = dijkstra(graph, indices=sources, return_predecessors=True)
+    return Ways(costs, previous)
+
+
+def distinct(tails: Indices, heads: Indices) -> tuple[Indices, Indices]:
+    """Pairs, each once."""
+    width = int(heads.max(initial=0)) + 1
+    tails, heads = np.divmod(np.unique(tails * width + heads), width)
+    return tails, heads
