@@ -1,0 +1,140 @@
+"""A triangular mesh: its triangles, who is whose neighbour, and how even it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from scipy.sparse import csr_array
+from shapely import Polygon
+
+from oxbow.contracts import FloatArray
+from oxbow.mesh.triangulation import SIDES, Indices, Triangulation, cross
+
+__all__ = ["AngleStatistics", "Mesh"]
+
+
+@dataclass(frozen=True)
+class AngleStatistics:
+    """How even a mesh is (Balampanis, Maza and Ollero 2016, Table I); an equilateral triangle has 60 degrees.
+
+    Parameters
+    ----------
+    least_deg, low_deg, mean_least_deg
+        The least angle of all, the 1st percentile over triangles of their least angle, and its mean.
+    greatest_deg
+        The greatest angle of all.
+    shortest_edge_m, mean_edge_m, longest_edge_m
+        Lengths of edges.
+    """
+
+    least_deg: float
+    low_deg: float
+    mean_least_deg: float
+    greatest_deg: float
+    shortest_edge_m: float
+    mean_edge_m: float
+    longest_edge_m: float
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles that tile an area: none reaches out of it, none overlaps another, and none is missing.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        The vertices, in planar metres.
+    triangles : ndarray of int, shape (m, 3)
+        Vertices of every triangle, counterclockwise.
+    neighbours : ndarray of int, shape (m, 3)
+        ``neighbours[t, k]`` is the triangle beyond the edge opposite corner k of triangle t; -1 beyond the border.
+    """
+
+    points: FloatArray
+    triangles: Indices
+    neighbours: Indices
+
+    @classmethod
+    def of(cls, triangulation: Triangulation) -> Mesh:
+        """The mesh of a triangulation, without points that no triangle uses."""
+        used, index = np.unique(triangulation.triangles, return_inverse=True)
+        twins = triangulation.twins.reshape(-1, 3)
+        return cls(triangulation.points[used], index.reshape(-1, 3), np.where(twins >= 0, twins // 3, -1))
+
+    def __len__(self) -> int:
+        return len(self.triangles)
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """Coordinates of the corners, shape (m, 3, 2)."""
+        return self.points[self.triangles]
+
+    @cached_property
+    def centroids(self) -> FloatArray:
+        """Shape (m, 2): the waypoints of Balampanis et al. 2016, section VI."""
+        return np.asarray(self.corners.mean(axis=1))
+
+    @cached_property
+    def areas_m2(self) -> FloatArray:
+        """Area of every triangle, shape (m,)."""
+        return cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0]) / 2
+
+    @cached_property
+    def edge_lengths_m(self) -> FloatArray:
+        """Length of the edge opposite each corner, shape (m, 3)."""
+        ends = self.corners[:, SIDES]
+        return np.asarray(np.hypot(*np.moveaxis(ends[:, :, 1] - ends[:, :, 0], 2, 0)))
+
+    @cached_property
+    def angles_rad(self) -> FloatArray:
+        """Angle at each corner, shape (m, 3)."""
+        towards = self.corners[:, SIDES] - self.corners[:, :, None]
+        dot = (towards[:, :, 0] * towards[:, :, 1]).sum(axis=2)
+        return np.asarray(np.arctan2(cross(towards[:, :, 0], towards[:, :, 1]), dot))
+
+    @cached_property
+    def angle_statistics(self) -> AngleStatistics:
+        """See `AngleStatistics`."""
+        angles = np.degrees(self.angles_rad)
+        least, lengths = angles.min(axis=1), self.edge_lengths_m
+        # An edge that two triangles share counts once.
+        once = (self.neighbours < 0) | (self.neighbours > np.arange(len(self))[:, None])
+        return AngleStatistics(
+            least_deg=float(least.min()),
+            low_deg=float(np.quantile(least, 0.01)),
+            mean_least_deg=float(least.mean()),
+            greatest_deg=float(angles.max()),
+            shortest_edge_m=float(lengths.min()),
+            mean_edge_m=float(lengths[once].mean()),
+            longest_edge_m=float(lengths.max()),
+        )
+
+    @cached_property
+    def polygons(self) -> npt.NDArray[np.object_]:
+        """Every triangle as a shapely polygon, shape (m,)."""
+        return np.asarray(shapely.polygons(self.corners), dtype=object)
+
+    @cached_property
+    def graph(self) -> csr_array[np.float64]:
+        """Neighbouring triangles, and the way from one's centroid to the other's over the middle of their edge."""
+        triangle, k = np.nonzero(self.neighbours >= 0)
+        gate = self.corners[triangle[:, None], SIDES[k]].mean(axis=1)
+        half = np.hypot(*(self.centroids[triangle] - gate).T)
+        one_way = csr_array((half, (triangle, self.neighbours[triangle, k])), shape=(len(self), len(self)))
+        return csr_array(one_way + one_way.T)
+
+    def located(self, places: FloatArray) -> Indices:
+        """The triangle that holds each place, shape (n,), or else the nearest one."""
+        tree = shapely.STRtree(self.polygons)
+        _, triangle = tree.query_nearest(shapely.points(np.atleast_2d(places)), all_matches=False)
+        return np.asarray(triangle)
+
+    def region(self, which: npt.NDArray[np.bool_]) -> Polygon:
+        """The union of some triangles that hang together by edges: exact, as no edge is computed anew."""
+        merged = shapely.coverage_union_all(self.polygons[which])
+        assert isinstance(merged, Polygon), "these triangles do not hang together"
+        return merged
