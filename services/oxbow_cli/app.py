@@ -188,22 +188,43 @@ def status(
 
 
 @app.command()
-def evaluate(file: MissionFile, json: AsJson = False) -> None:
-    """Judge the path in a completed Mission File, whoever made it.
+def evaluate(
+    file: Annotated[Path | None, typer.Argument(metavar="[FILE]", help="The Mission File.")] = None,
+    compare: Annotated[
+        tuple[Path, Path] | None, typer.Option(metavar="A B", help="Two Mission Files, side by side.")
+    ] = None,
+    json: AsJson = False,
+) -> None:
+    """Judge the path in a completed Mission File, whoever made it; or compare two.
 
-    Measures how well the path covers the water, with certified bounds, and whether it keeps to it.
+    Measures how well the path covers the water, with certified bounds, and whether it keeps to it. A comparison
+    marks the better figure of each measure, and says where the two missions are not the same.
 
-    Example: `oxbow evaluate lake.json --json`
+    Examples:
+
+    - `oxbow evaluate lake.json --json`
+    - `oxbow evaluate --compare lake-a.json lake-b.json`
     """
+    from oxbow.errors import InvalidMission
     from oxbow.mission import read_mission
     from oxbow_cli import report
+    from oxbow_cli.comparison import compare as compare_paths
     from oxbow_cli.evaluation import evaluate
 
-    found = evaluate(read_mission(file))
-    if json:
-        report.print_json(found)
-    else:
-        report.print_evaluation(file.name, found)
+    if (file is None) == (compare is None):
+        raise InvalidMission("expected one Mission File, or two after --compare", where="FILE")
+    if compare is not None:
+        comparison = compare_paths(*map(read_mission, compare))
+        if json:
+            report.print_json(report.comparison_document(compare, comparison))
+        else:
+            report.print_comparison(compare, comparison)
+    elif file is not None:
+        found = evaluate(read_mission(file))
+        if json:
+            report.print_json(found)
+        else:
+            report.print_evaluation(file.name, found)
 
 
 @app.command(name="import")
@@ -248,18 +269,25 @@ def import_site(
 def picture(
     file: MissionFile,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="PNG|SVG", help="The picture to write.")],
+    gaps: Annotated[
+        bool, typer.Option("--gaps", help="Colour the water by its distance to the path, and mark the worst gap.")
+    ] = False,
 ) -> None:
     """Draw a completed Mission File.
 
-    Example: `oxbow picture lake.json -o lake.png`
+    Examples:
+
+    - `oxbow picture lake.json -o lake.png`
+    - `oxbow picture lake.json --gaps -o gaps.png`
     """
     from oxbow.mission import read_mission
     from oxbow_cli.arguments import writing
+    from oxbow_cli.gaps import draw_gaps
     from oxbow_cli.picture import draw
 
     mission = read_mission(file)
     with writing(output):
-        draw(mission, output)
+        (draw_gaps if gaps else draw)(mission, output)
 
 
 @app.command()

@@ -16,7 +16,7 @@ from oxbow.plan import PlanCertificate
 from oxbow.site import Site
 from oxbow_certificate.certify import certify
 
-__all__ = ["Evaluation", "evaluate"]
+__all__ = ["Evaluation", "certify_request", "evaluate"]
 
 
 class Evaluation(PlanCertificate, frozen=True, kw_only=True):
@@ -31,6 +31,31 @@ class Evaluation(PlanCertificate, frozen=True, kw_only=True):
     ends_at_recovery_m: float
 
 
+def certify_request(mission: Mission, site: Site) -> CertifyRequest:
+    """What the stage `certificate` is asked about a mission's path as it stands in the file.
+
+    Raises
+    ------
+    InvalidMission
+        There is no path.
+    """
+    waypoints = mission.master_path or ()
+    if len(waypoints) < 2:
+        raise InvalidMission(
+            f"has {len(waypoints)} waypoints; expected a path: `oxbow plan` makes one", where="Master_Path"
+        )
+    return CertifyRequest(
+        outline=site.outline,
+        zones=site.zones,
+        safety_m=mission.safety_m,
+        path=LineString(site.frame.to_planar(lonlat(waypoints))),
+        launch=site.launch,
+        recovery=site.recovery,
+        speed_mps=mission.master_speed_mps,
+        variogram=mission.variogram,
+    )
+
+
 def evaluate(mission: Mission) -> Evaluation:
     """Judge a mission's path as it stands in the file, whoever made it.
 
@@ -41,26 +66,10 @@ def evaluate(mission: Mission) -> Evaluation:
     Infeasible
         The zones or the safety distance leave no water to judge on.
     """
-    waypoints = mission.master_path or ()
-    if len(waypoints) < 2:
-        raise InvalidMission(
-            f"has {len(waypoints)} waypoints; expected a path: `oxbow plan` makes one", where="Master_Path"
-        )
     site = Site.of(mission)
-    degrees = lonlat(waypoints)
-    path = LineString(site.frame.to_planar(degrees))
-    certificate = certify(
-        CertifyRequest(
-            outline=site.outline,
-            zones=site.zones,
-            safety_m=mission.safety_m,
-            path=path,
-            launch=site.launch,
-            recovery=site.recovery,
-            speed_mps=mission.master_speed_mps,
-        )
-    )
-    length_m = geodesic_length_m(degrees)
+    request = certify_request(mission, site)
+    certificate = certify(request)
+    length_m = geodesic_length_m(lonlat(mission.master_path or ()))
     measures = msgspec.structs.asdict(certificate) | {
         "length_m": length_m,
         "duration_s": length_m / mission.master_speed_mps,
@@ -70,8 +79,8 @@ def evaluate(mission: Mission) -> Evaluation:
         **measures,
         max_length_m=mission.master_length_m,
         length_ratio=length_m / mission.master_length_m,
-        starts_at_launch_m=math.dist(path.coords[0], site.launch),
-        ends_at_recovery_m=math.dist(path.coords[-1], site.recovery),
+        starts_at_launch_m=math.dist(request.path.coords[0], site.launch),
+        ends_at_recovery_m=math.dist(request.path.coords[-1], site.recovery),
     )
 
 

@@ -13,16 +13,28 @@ import msgspec
 from rich import box
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from oxbow.contracts import MissionState
+from oxbow.frame import Position
 
 if TYPE_CHECKING:
     from oxbow.plan import PlanRecord
+    from oxbow_cli.comparison import Comparison
     from oxbow_cli.evaluation import Evaluation
     from oxbow_cli.planning import Planned, Progress
     from oxbow_cli.status import Process, StackStatus
 
-__all__ = ["plan_document", "print_evaluation", "print_json", "print_plan", "print_status", "progress_bar"]
+__all__ = [
+    "comparison_document",
+    "plan_document",
+    "print_comparison",
+    "print_evaluation",
+    "print_json",
+    "print_plan",
+    "print_status",
+    "progress_bar",
+]
 
 MOST_DROPPED = 3
 
@@ -95,11 +107,39 @@ def _plan_table(site: str, plan: PlanRecord) -> Table:
 
 def print_evaluation(site: str, found: Evaluation) -> None:
     """Write every measure of an evaluation to stdout, under its name."""
-    rows = []
-    for name, value in msgspec.structs.asdict(found).items():
-        text = _place(value) if name == "worst_gap" and value is not None else _figure(value)
-        rows.append((name, text))
+    rows = ((name, _figure(value)) for name, value in msgspec.structs.asdict(found).items())
     _console().print(_table(f"Evaluation of {site}", rows))
+
+
+def comparison_document(files: tuple[Path, Path], found: Comparison) -> dict[str, Any]:
+    """What `--json` prints of a comparison."""
+    return {"files": files} | msgspec.structs.asdict(found)
+
+
+def print_comparison(files: tuple[Path, Path], found: Comparison) -> None:
+    """Write two evaluations side by side to stdout, the better figure marked, and who is better at what."""
+    table = _grid("Comparison; * is better, by more than 1 %", left=("measure",), right=())
+    for file in files:
+        table.add_column(str(file), justify="right", overflow="fold")
+    for name in found.first.__struct_fields__:
+        ours, theirs = (_figure(getattr(one, name)) for one in (found.first, found.second))
+        table.add_row(
+            name, _marked(ours, name in found.first_better), _marked(theirs, name in found.second_better)
+        )
+    console = _console()
+    console.print(table)
+    for difference in found.differences:
+        console.print(f"warning: not the same mission: {difference}", soft_wrap=True)
+    if found.differences:
+        console.print("Only what does not depend on the mission is compared.")
+    sides = (found.first_better, found.first_breaks), (found.second_better, found.second_breaks)
+    for file, (better, breaks) in zip(files, sides, strict=True):
+        console.print(f"{file}: {'; '.join(breaks) or 'keeps every rule'}", soft_wrap=True)
+        console.print(f"    better at {', '.join(better) or 'nothing'}", soft_wrap=True)
+
+
+def _marked(text: str, is_better: bool) -> Text:
+    return Text(f"* {text}", style="bold") if is_better else Text(text)
 
 
 def print_status(found: StackStatus) -> None:
@@ -182,11 +222,16 @@ def _duration(duration_s: float) -> str:
     return f"{hours} h {minutes:02d} min"
 
 
-def _place(place: Any) -> str:
+def _place(place: Position) -> str:
     return f"{place.lat:.6f}, {place.long:.6f}"
 
 
 def _figure(value: Any) -> str:
+    """A measure as text: six digits, bounds with two dots between them, none as a dash."""
+    if value is None:
+        return "-"
+    if isinstance(value, Position):
+        return _place(value)
     if isinstance(value, tuple):
         return " .. ".join(map(_figure, value))
     return f"{value:.6g}" if isinstance(value, float) else str(value)

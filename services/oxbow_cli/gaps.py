@@ -1,0 +1,142 @@
+"""A map of a path's gaps: the water coloured by its distance to the path."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import shapely
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from shapely import LineString, MultiPolygon
+
+from oxbow.mission import Mission
+from oxbow.site import Site
+from oxbow_certificate.certify import Judgement, judge
+from oxbow_certificate.distance import PathDistance
+from oxbow_cli import sheet
+from oxbow_cli.evaluation import certify_request
+from oxbow_cli.sheet import INK
+
+__all__ = ["GAPS", "MOST_RADII", "draw_gaps"]
+
+MOST_RADII = 2.5
+"""The scale's end, in least radii: the same in every picture, so that pictures can be compared."""
+
+GAPS = LinearSegmentedColormap.from_list(
+    "gaps",
+    [
+        (radii / MOST_RADII, colour)
+        for radii, colour in (
+            (0.0, "#f3f9fb"),
+            (1.0, "#86bbd2"),
+            (1.12, "#f5efcf"),
+            (1.5, "#f3a950"),
+            (2.0, "#c8322b"),
+            (2.5, "#5c0c22"),
+        )
+    ],
+)
+"""Blue as far as the best possible path would be from its farthest water, and warm beyond."""
+
+_PLACES = 250_000
+
+
+def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
+    """Draw the distance of a mission's water to its path to a PNG or SVG file, in units of the least radius.
+
+    Parameters
+    ----------
+    mission
+        A Mission File with a path, whoever made it.
+    path
+        The picture's file, replaced as a whole; its suffix chooses the format.
+    width_px
+        Width of the picture; its height follows from the site.
+
+    Raises
+    ------
+    InvalidMission
+        There is no path, the suffix is none of the two, the width is not positive, or the site is not valid.
+    Infeasible
+        The zones or the safety distance leave no water to judge on.
+    """
+    sheet.checked_format(path, width_px)
+    site = Site.of(mission)
+    request = certify_request(mission, site)
+    judgement = judge(request)
+    figure, axes = sheet.new_sheet(site)
+    sheet.draw_site(axes, site, mission.safety_m)
+    _draw_distance(axes, judgement.space.judged, request.path, judgement.certificate.least_radius_m)
+    _draw_path(axes, request.path, site.nominal_spacing_m)
+    _draw_worst_gap(axes, judgement)
+    sheet.draw_ends(axes, site)
+    sheet.draw_scale_and_north(axes)
+    _draw_key(figure, judgement.certificate.least_radius_m)
+    sheet.draw_header(figure, f"Gaps of {mission.site_name or 'the path'}", _figures(judgement))
+    sheet.save_sheet(figure, path, width_px)
+
+
+def _draw_distance(axes: Axes, region: MultiPolygon, path: LineString, least_radius_m: float) -> None:
+    """The distance on a grid, clipped to the region."""
+    west, south, east, north = region.bounds
+    pixel_m = (axes.get_xlim()[1] - axes.get_xlim()[0]) / 2000
+    step_m = max(math.sqrt(region.area / _PLACES), pixel_m)
+    x = np.arange(west - step_m, east + 2 * step_m, step_m)
+    y = np.arange(south - step_m, north + 2 * step_m, step_m)
+    places = np.stack(np.meshgrid(x, y), axis=-1)
+    # Two steps beyond the region, so that its border is coloured to the edge.
+    near = region.buffer(2 * step_m)
+    shapely.prepare(near)
+    wanted = shapely.contains_xy(near, places[..., 0], places[..., 1])
+    radii = np.full(wanted.shape, np.nan)
+    radii[wanted] = PathDistance(path)(places[wanted]) / least_radius_m
+    image = axes.imshow(
+        radii,
+        extent=(x[0] - step_m / 2, x[-1] + step_m / 2, y[0] - step_m / 2, y[-1] + step_m / 2),
+        origin="lower",
+        cmap=GAPS,
+        vmin=0.0,
+        vmax=MOST_RADII,
+        interpolation="bilinear",
+        aspect="auto",
+        zorder=3.5,
+    )
+    clip = sheet.patch(region, facecolor="none", edgecolor="none")
+    axes.add_patch(clip)
+    image.set_clip_path(clip)
+
+
+def _draw_path(axes: Axes, path: LineString, spacing_m: float) -> None:
+    width = 0.6 * sheet.line_width(axes, spacing_m)
+    lines = LineCollection([shapely.get_coordinates(path)], colors=INK, linewidths=width, alpha=0.75, zorder=4)
+    axes.add_collection(lines, autolim=False)
+
+
+def _draw_worst_gap(axes: Axes, judgement: Judgement) -> None:
+    radius_m = judgement.cover.low_m
+    radii = radius_m / judgement.certificate.least_radius_m
+    text = f"worst gap {sheet.distance_text(radius_m)}, {radii:.2f} least radii"
+    sheet.draw_gap(axes, judgement.cover.place, radius_m, text)
+
+
+def _draw_key(figure: Figure, least_radius_m: float) -> None:
+    key = sheet.add_key(figure, 0.5, 0.44, GAPS)
+    for radii in np.arange(0.0, MOST_RADII + 0.5, 0.5):
+        text = f"{radii:g}" if radii < MOST_RADII else f"{radii:g} and more"
+        key.text(radii / MOST_RADII, -0.6, text, ha="center", va="top", fontsize=8, color=INK)
+    text = f"distance to the path, in least radii of {sheet.distance_text(least_radius_m)}"
+    key.text(0.0, 1.5, text, ha="left", va="bottom", fontsize=8, color=INK)
+
+
+def _figures(judgement: Judgement) -> str:
+    """The line below the title: how much of the water is within the least radius, and how far the rest is."""
+    measures = judgement.certificate
+    within = np.mean(judgement.spread.distance_m <= measures.least_radius_m)
+    return (
+        f"{within:.0%} of the water within the least radius of the path   q {measures.q:.2f}"
+        f"   p95 {measures.p95_ratio:.2f}   p99 {measures.p99_ratio:.2f}   mean {measures.mean_ratio:.2f}"
+    )

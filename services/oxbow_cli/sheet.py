@@ -1,0 +1,239 @@
+"""The sheet that pictures of a mission are drawn on: map, land and water, scale, header, and the file."""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+
+import numpy as np
+import shapely
+from matplotlib import patheffects
+from matplotlib.axes import Axes
+from matplotlib.colors import Colormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, PathPatch
+from matplotlib.patches import Polygon as PolygonPatch
+from matplotlib.path import Path as Outline
+from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from oxbow.contracts import Place
+from oxbow.errors import InvalidMission
+from oxbow.files import write_atomically
+from oxbow.site import Site
+from oxbow_certificate.erosion import eroded
+
+__all__ = [
+    "GAP",
+    "INK",
+    "WATER",
+    "add_key",
+    "area_text",
+    "checked_format",
+    "distance_text",
+    "draw_ends",
+    "draw_gap",
+    "draw_header",
+    "draw_scale_and_north",
+    "draw_site",
+    "line_width",
+    "new_sheet",
+    "note",
+    "patch",
+    "save_sheet",
+]
+
+FORMATS = {".png": "png", ".svg": "svg"}
+
+LAND, WATER, MARGIN, SHORE, INK = "#f4f0e6", "#d3e6ef", "#e6f0f3", "#7d8f96", "#24343b"
+FORBIDDEN, FORBIDDEN_EDGE, GAP = "#e8d8c3", "#b5805a", "#c8322b"
+_DPI = 200
+_HEADER_IN, _FOOTER_IN = 0.85, 0.75
+_HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
+
+
+def checked_format(path: Path, width_px: int) -> str:
+    """The format that a picture's name asks for.
+
+    Raises
+    ------
+    InvalidMission
+        The suffix is neither .png nor .svg, or the width is not positive.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise InvalidMission(f"is {str(path)!r}; expected a name that ends in .png or .svg", where="--output")
+    if width_px < 1:
+        raise InvalidMission(f"is {width_px}; expected a width of at least 1 pixel", where="width_px")
+    return FORMATS[path.suffix.lower()]
+
+
+def save_sheet(figure: Figure, path: Path, width_px: int) -> None:
+    """Write a sheet to its file, as a whole."""
+    kind = checked_format(path, width_px)
+    picture = io.BytesIO()
+    metadata = {"Date": None} if kind == "svg" else {}
+    figure.savefig(picture, format=kind, dpi=_DPI * width_px / 2000, metadata=metadata)
+    write_atomically(path, picture.getvalue())
+
+
+def new_sheet(site: Site) -> tuple[Figure, Axes]:
+    """A sheet of fixed width in inches, as tall as the site needs, and the map's axes in metres."""
+    west, south, east, north = shapely.union_all(
+        [site.outline, shapely.Point(site.launch), shapely.Point(site.recovery)]
+    ).bounds
+    margin = 0.04 * max(east - west, north - south)
+    width_m, height_m = east - west + 2 * margin, north - south + 2 * margin
+    width_in = 2000 / _DPI
+    map_in = width_in * min(max(height_m / width_m, 0.4), 1.25)
+    height_in = map_in + _HEADER_IN + _FOOTER_IN
+    figure = Figure(figsize=(width_in, height_in), facecolor=LAND)
+    axes = figure.add_axes((0, _FOOTER_IN / height_in, 1, map_in / height_in))
+    metres_per_in = max(width_m / width_in, height_m / map_in)
+    centre_x, centre_y = (west + east) / 2, (south + north) / 2
+    axes.set_xlim(centre_x - metres_per_in * width_in / 2, centre_x + metres_per_in * width_in / 2)
+    axes.set_ylim(centre_y - metres_per_in * map_in / 2, centre_y + metres_per_in * map_in / 2)
+    axes.set_axis_off()
+    return figure, axes
+
+
+def draw_site(axes: Axes, site: Site, safety_m: float) -> None:
+    """Land, zones, the water that the safety distance keeps, and the rest of the water."""
+    water = site.outline.difference(shapely.union_all(site.zones))
+    if not isinstance(water, Polygon | MultiPolygon):
+        raise InvalidMission("leaves no water within the outline", where="ForbiddenZones")
+    pixel_m = (axes.get_xlim()[1] - axes.get_xlim()[0]) / 2000
+    axes.add_patch(patch(site.outline, facecolor=FORBIDDEN, edgecolor="none", zorder=1))
+    axes.add_patch(
+        patch(
+            shapely.union_all(site.zones).intersection(site.outline),
+            facecolor="none",
+            edgecolor=FORBIDDEN_EDGE,
+            hatch="//////",
+            linewidth=0,
+            zorder=1.5,
+        )
+    )
+    axes.add_patch(patch(water, facecolor=MARGIN, edgecolor=SHORE, linewidth=0.7, zorder=2))
+    axes.add_patch(patch(eroded(water, safety_m, pixel_m / 4), facecolor=WATER, edgecolor="none", zorder=3))
+
+
+def patch(geometry: BaseGeometry, **style: object) -> PathPatch:
+    """Polygons, holes and all, as one patch."""
+    polygons = [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon)]
+    rings = [ring for polygon in polygons for ring in (polygon.exterior, *polygon.interiors)]
+    outlines = [Outline(shapely.get_coordinates(ring), closed=True) for ring in rings if not ring.is_empty]
+    return PathPatch(Outline.make_compound_path(*outlines), **style)
+
+
+def draw_ends(axes: Axes, site: Site) -> None:
+    """The launch and recovery points."""
+    together = math.dist(site.launch, site.recovery) < 1.0
+    ends = [(site.launch, "o", "launch and recovery" if together else "launch")]
+    if not together:
+        ends.append((site.recovery, "s", "recovery"))
+    for place, marker, label in ends:
+        axes.plot(
+            *place, marker=marker, markersize=7, color="white", markeredgecolor=INK, markeredgewidth=1.6, zorder=7
+        )
+        note(axes, place, label, colour=INK)
+
+
+def note(axes: Axes, place: Place, text: str, *, colour: str) -> None:
+    """A label beside a place, on the side that has room."""
+    west, east = axes.get_xlim()
+    right = place[0] < west + 0.8 * (east - west)
+    axes.annotate(
+        text,
+        place,
+        xytext=(7 if right else -7, 5),
+        textcoords="offset points",
+        ha="left" if right else "right",
+        fontsize=8,
+        color=colour,
+        path_effects=_HALO,
+        zorder=8,
+    )
+
+
+def draw_scale_and_north(axes: Axes) -> None:
+    """A scale bar of a round length and an arrow to the north, below the map."""
+    (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
+    bar_m = _round_down(0.2 * (east - west))
+    x, y = west + 0.04 * (east - west), south - 0.35 * _FOOTER_IN * (north - south) / _map_height_in(axes)
+    height_m = 0.004 * (east - west)
+    for part, colour in enumerate((INK, "white", INK, "white")):
+        axes.add_patch(
+            PolygonPatch(
+                shapely.get_coordinates(
+                    shapely.box(x + part * bar_m / 4, y, x + (part + 1) * bar_m / 4, y + height_m)
+                ),
+                facecolor=colour,
+                edgecolor=INK,
+                linewidth=0.6,
+                clip_on=False,
+            )
+        )
+    axes.text(x + bar_m + 0.01 * (east - west), y, distance_text(bar_m), fontsize=8, color=INK, va="baseline")
+    axes.annotate(
+        "N",
+        xy=(0.965, 0.985),
+        xytext=(0.965, 0.985 - 0.55 / _map_height_in(axes)),
+        xycoords="axes fraction",
+        ha="center",
+        va="center",
+        color=INK,
+        fontsize=10,
+        arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 1.4},
+    )
+
+
+def line_width(axes: Axes, spacing_m: float) -> float:
+    """Width in points at which legs are kept apart, whatever their spacing."""
+    west, east = axes.get_xlim()
+    points_per_m = axes.figure.get_window_extent().width / axes.figure.dpi * 72 / (east - west)
+    return min(max(0.3 * spacing_m * points_per_m, 0.35), 1.6)
+
+
+def draw_gap(axes: Axes, place: Place, radius_m: float, text: str) -> None:
+    """The disc that a gap would hold."""
+    axes.add_patch(
+        Circle(place, radius_m, facecolor="none", edgecolor=GAP, linewidth=1.1, linestyle=(0, (3, 2)), zorder=6)
+    )
+    note(axes, (place[0], place[1] + radius_m), text, colour=GAP)
+
+
+def _map_height_in(axes: Axes) -> float:
+    return float(axes.get_position().height * axes.figure.get_window_extent().height / axes.figure.dpi)
+
+
+def add_key(figure: Figure, left: float, width: float, cmap: str | Colormap) -> Axes:
+    """A strip of a colour map in the sheet's footer, from 0 to 1 along its x axis."""
+    height_in = figure.get_figheight()
+    key = figure.add_axes((left, 0.36 / height_in, width, 0.1 / height_in))
+    key.imshow(np.linspace(0, 1, 256)[None, :], aspect="auto", cmap=cmap, extent=(0, 1, 0, 1))
+    key.set_axis_off()
+    return key
+
+
+def draw_header(figure: Figure, title: str, figures: str) -> None:
+    """The site's name, and a line of figures below it."""
+    top = 1 - 0.38 / figure.get_figheight()
+    figure.text(0.04, top, title, fontsize=15, weight="bold", color=INK)
+    figure.text(0.04, top - 0.27 / figure.get_figheight(), figures, fontsize=9.5, color=INK)
+
+
+def _round_down(length_m: float) -> float:
+    """The longest of 1, 2 and 5 times a power of ten that is not above a length."""
+    power = 10.0 ** math.floor(math.log10(length_m))
+    return max(step * power for step in (1, 2, 5) if step * power <= length_m)
+
+
+def distance_text(length_m: float) -> str:
+    """A length to be read: kilometres or metres."""
+    return f"{length_m / 1000:,.4g} km" if length_m >= 1000 else f"{length_m:.3g} m"
+
+
+def area_text(area_m2: float) -> str:
+    """An area to be read: square kilometres or metres."""
+    return f"{area_m2 / 1e6:.3g} km²" if area_m2 >= 1e4 else f"{area_m2:.3g} m²"
