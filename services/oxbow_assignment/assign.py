@@ -1,0 +1,144 @@
+"""Share targets out among vehicles: cluster, match, order; then mend.
+
+Clusters of targets go to vehicles, and each vehicle puts its own in order (Innocenti, Pollini and Bracci 2006,
+section 4.4). The report has no ranges and no idea of balance; what that leaves to do is done by insertions and
+exchanges.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from oxbow.errors import InvalidMission
+from oxbow_assignment.assignment import Assignment, assignment_of
+from oxbow_assignment.clustering import Clusters, cluster_by_radius, fuzzy_c_means, k_means
+from oxbow_assignment.exchange import exchanged
+from oxbow_assignment.insertion import inserted, trimmed
+from oxbow_assignment.matching import match
+from oxbow_assignment.ordering import best_path
+from oxbow_assignment.problem import IntArray, Problem
+from oxbow_assignment.pseudo_coordinates import PseudoCoordinates, pseudo_coordinates
+
+__all__ = ["ClusterMethod", "Clustered", "Clustering", "assign", "mended"]
+
+
+class ClusterMethod(enum.StrEnum):
+    """How targets are clustered."""
+
+    K_MEANS = "k-means"
+    FUZZY_C_MEANS = "fuzzy c-means"
+    RADIUS = "radius"
+
+
+@dataclass(frozen=True)
+class Clustering:
+    """How targets are clustered.
+
+    Parameters
+    ----------
+    method
+        k-means or fuzzy c-means with `k` clusters, or as many as `radius_m` asks for.
+    k
+        The number of clusters; by default as many as vehicles that can visit a target. At most the number of
+        targets are made.
+    radius_m
+        The longest mean route from a target to its cluster's targets, for `ClusterMethod.RADIUS` and only for it.
+    seed
+        Where k-means starts.
+
+    Raises
+    ------
+    InvalidMission
+        A number or a radius that is missing, out of place or not positive.
+    """
+
+    method: ClusterMethod = ClusterMethod.K_MEANS
+    k: int | None = None
+    radius_m: float | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        by_radius = self.method is ClusterMethod.RADIUS
+        if by_radius != (self.radius_m is not None):
+            raise InvalidMission(
+                f"is {self.radius_m!r}; expected a number >= 0 for method {ClusterMethod.RADIUS.value!r} and none"
+                f" for another; the method is {self.method.value!r}",
+                where="radius_m",
+            )
+        if self.k is not None and (by_radius or self.k < 1):
+            raise InvalidMission(f"is {self.k}; expected 1 or more, and none with a radius", where="k")
+
+
+@dataclass(frozen=True)
+class Clustered:
+    """An assignment, and the clusters that it was made from.
+
+    Parameters
+    ----------
+    targets : ndarray of shape (m,)
+        The targets that were clustered: those that some vehicle can visit.
+    clusters
+        Their clusters.
+    owners : ndarray of shape (k,)
+        The index of the vehicle that each cluster was matched to.
+    stress
+        How ill the clusters' space pictures the routes; see `PseudoCoordinates`.
+    """
+
+    assignment: Assignment
+    targets: IntArray
+    clusters: Clusters | None
+    owners: IntArray
+    stress: float
+
+
+def assign(problem: Problem, clustering: Clustering | None = None) -> Clustered:
+    """Who visits which targets in which order, by clusters.
+
+    Every tour is within its vehicle's range, and every target is in a tour or among the unserved.
+    """
+    clustering = clustering or Clustering()
+    targets = np.flatnonzero(problem.can_visit.any(axis=0))
+    idle = [np.array([start, end]) for start, end in zip(problem.starts, problem.recoveries, strict=True)]
+    if not len(targets):
+        return Clustered(assignment_of(problem, idle), targets, None, np.empty(0, dtype=np.intp), 0.0)
+    coordinates = pseudo_coordinates(problem.finite[np.ix_(targets, targets)])
+    clusters = _clusters(problem, coordinates, clustering)
+    owners = match(problem, clusters, targets)
+    paths = [
+        trimmed(
+            problem, vehicle, best_path(problem.finite, start, targets[owners[clusters.labels] == vehicle], end)
+        )
+        for vehicle, (start, end) in enumerate(idle)
+    ]
+    assignment = assignment_of(problem, mended(problem, paths, [0] * len(paths)))
+    return Clustered(assignment, targets, clusters, owners, coordinates.stress)
+
+
+def mended(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -> Sequence[IntArray]:
+    """Paths after insertions and exchanges, in turns for as long as another target fits.
+
+    Parameters
+    ----------
+    paths
+        One a vehicle, each within its range: rows of the problem's distances, start first and recovery last.
+    held
+        How many leading targets of each path stay in front.
+    """
+    served = -1
+    while served < sum(map(len, paths := exchanged(problem, inserted(problem, paths, held), held))):
+        served = sum(map(len, paths))
+    return paths
+
+
+def _clusters(problem: Problem, coordinates: PseudoCoordinates, clustering: Clustering) -> Clusters:
+    if clustering.radius_m is not None:
+        return cluster_by_radius(coordinates, clustering.radius_m)
+    able = int(problem.can_visit.any(axis=1).sum())
+    k = min(clustering.k or able, len(coordinates.places))
+    cluster = fuzzy_c_means if clustering.method is ClusterMethod.FUZZY_C_MEANS else k_means
+    return cluster(coordinates, k, seed=clustering.seed)

@@ -1,0 +1,153 @@
+"""Who visits which targets, in which order, and what that costs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from oxbow.contracts import FloatArray
+from oxbow_assignment.ordering import path_length
+from oxbow_assignment.problem import IntArray, Objective, Problem
+
+__all__ = ["Assignment", "Tour", "Unserved", "assignment_of", "tour_length", "tour_lengths"]
+
+
+@dataclass(frozen=True)
+class Tour:
+    """What one vehicle does: its targets in order, from its start to its recovery.
+
+    A vehicle without targets stays where it is: 0 m.
+    """
+
+    vehicle: str
+    targets: tuple[int, ...]
+    length_m: float
+    duration_s: float
+
+
+@dataclass(frozen=True)
+class Unserved:
+    """A target that nobody visits, and why.
+
+    Parameters
+    ----------
+    target
+        Its index.
+    detour_m
+        By how much it would lengthen the tour of a vehicle with its role, at the least; infinite without such a
+        vehicle or route.
+    reason
+        What is missing: a role, range, or range left beside the other targets.
+    """
+
+    target: int
+    detour_m: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """Tours, one a vehicle, each within its vehicle's range; targets are in one tour or unserved.
+
+    Parameters
+    ----------
+    value
+        What the targets that are visited are worth.
+    """
+
+    tours: tuple[Tour, ...]
+    unserved: tuple[Unserved, ...]
+    objective: Objective
+    value: float
+
+    @property
+    def total_length_m(self) -> float:
+        return sum(tour.length_m for tour in self.tours)
+
+    @property
+    def total_duration_s(self) -> float:
+        return sum(tour.duration_s for tour in self.tours)
+
+    @property
+    def makespan_s(self) -> float:
+        """When the last vehicle is done."""
+        return max(tour.duration_s for tour in self.tours)
+
+    @property
+    def cost_s(self) -> float:
+        """The objective."""
+        return self.makespan_s if self.objective is Objective.MAKESPAN else self.total_duration_s
+
+
+def tour_length(problem: Problem, path: IntArray) -> float:
+    """Metres of one vehicle's path; 0 without targets."""
+    return path_length(problem.finite, path) if len(path) > 2 else 0.0
+
+
+def tour_lengths(problem: Problem, paths: Sequence[IntArray]) -> FloatArray:
+    """Metres of each vehicle's path."""
+    return np.array([tour_length(problem, path) for path in paths])
+
+
+def assignment_of(problem: Problem, paths: Sequence[IntArray]) -> Assignment:
+    """The assignment in which each vehicle goes its path: rows of the distances, start first and recovery last."""
+    lengths = tour_lengths(problem, paths)
+    tours = tuple(
+        Tour(
+            vehicle=vehicle.name,
+            targets=tuple(path[1:-1].tolist()),
+            length_m=float(length_m),
+            duration_s=float(length_m) / vehicle.speed_mps,
+        )
+        for vehicle, path, length_m in zip(problem.vehicles, paths, lengths, strict=True)
+    )
+    served = np.array([target for tour in tours for target in tour.targets], dtype=int)
+    left = np.setdiff1d(np.arange(problem.count), served)
+    return Assignment(
+        tours=tours,
+        unserved=_unserved(problem, paths, lengths, left),
+        objective=problem.objective,
+        value=float(problem.values[served].sum()),
+    )
+
+
+def _unserved(
+    problem: Problem, paths: Sequence[IntArray], lengths: FloatArray, left: IntArray
+) -> tuple[Unserved, ...]:
+    detours = np.array([_detours(problem, path, left) for path in paths]).reshape(len(paths), len(left))
+    detours = np.where(problem.has_role[:, left], detours, np.inf)
+    return tuple(
+        Unserved(target=target, detour_m=float(own.min()), reason=_reason(problem, target, own, lengths))
+        for target, own in zip(left.tolist(), detours.T, strict=True)
+    )
+
+
+def _detours(problem: Problem, path: IntArray, targets: IntArray) -> FloatArray:
+    """By how much each target would lengthen a path, where it does so least; shape (n,)."""
+    away = problem.distances[np.ix_(targets, path)]
+    known = problem.finite[path[:-1], path[1:]] if len(path) > 2 else np.zeros(1)
+    detours: FloatArray = (away[:, :-1] + away[:, 1:] - known).min(axis=1)
+    return detours
+
+
+def _reason(problem: Problem, target: int, detours: FloatArray, lengths: FloatArray) -> str:
+    if not problem.has_role[:, target].any():
+        return f"asks for a {problem.roles[target]}, and no vehicle is one"
+    if not problem.can_visit[:, target].any():
+        short = np.where(
+            problem.has_role[:, target], problem.there_and_back_m[:, target] - problem.lengths_m, np.inf
+        )
+        nearest = int(short.argmin())
+        if not np.isfinite(short[nearest]):
+            return "no route leads to it from any vehicle with its role"
+        return (
+            f"out of every vehicle's reach: {problem.vehicles[nearest].name!r} would travel"
+            f" {problem.there_and_back_m[nearest, target]:.0f} m and may travel {problem.lengths_m[nearest]:.0f} m"
+        )
+    nearest = int((detours - (problem.lengths_m - lengths)).argmin())
+    return (
+        f"no range left: it would lengthen the tour of {problem.vehicles[nearest].name!r} by"
+        f" {detours[nearest]:.0f} m, and {problem.lengths_m[nearest] - lengths[nearest]:.0f} m are left"
+    )

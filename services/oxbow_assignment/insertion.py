@@ -1,0 +1,77 @@
+"""Fit tours into ranges: targets that are too much are taken out, and put in where there is range left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from oxbow.contracts import FloatArray
+from oxbow_assignment.assignment import tour_length
+from oxbow_assignment.problem import IntArray, Problem
+
+__all__ = ["inserted", "trimmed"]
+
+
+def trimmed(problem: Problem, vehicle: int, path: IntArray) -> IntArray:
+    """A path within its vehicle's range, of targets that it may visit: while it is too long, the target goes that
+    saves most metres for its value.
+    """
+    inner = path[1:-1]
+    path = np.concatenate([path[:1], inner[problem.can_visit[vehicle, inner]], path[-1:]])
+    while tour_length(problem, path) > problem.lengths_m[vehicle]:
+        before, at, after = path[:-2], path[1:-1], path[2:]
+        saved = problem.finite[before, at] + problem.finite[at, after] - problem.finite[before, after]
+        path = np.delete(path, 1 + int((saved / problem.values[at]).argmax()))
+    return path
+
+
+def inserted(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -> list[IntArray]:
+    """The paths with every target put in that fits: always the one that costs least for its value.
+
+    Parameters
+    ----------
+    paths
+        One a vehicle, within its range.
+    held
+        How many leading targets of each path stay in front.
+    """
+    paths = list(paths)
+    served = np.concatenate([path[1:-1] for path in paths])
+    pool = np.setdiff1d(np.flatnonzero(problem.can_visit.any(axis=0)), served)
+    offers = [_offers(problem, vehicle, path, held[vehicle], pool) for vehicle, path in enumerate(paths)]
+    while len(pool):
+        costs = np.array([offer.costs for offer in offers])
+        vehicle, chosen = divmod(int(costs.argmin()), len(pool))
+        if not np.isfinite(costs[vehicle, chosen]):
+            break
+        paths[vehicle] = np.insert(paths[vehicle], offers[vehicle].places[chosen], pool[chosen])
+        pool = np.delete(pool, chosen)
+        offers = [offer.without(chosen) for offer in offers]
+        offers[vehicle] = _offers(problem, vehicle, paths[vehicle], held[vehicle], pool)
+    return paths
+
+
+@dataclass(frozen=True)
+class _Offers:
+    """For each target of a pool, where one path takes it best, and at what cost; infinite where it cannot."""
+
+    costs: FloatArray
+    places: IntArray
+
+    def without(self, chosen: int) -> _Offers:
+        return _Offers(np.delete(self.costs, chosen), np.delete(self.places, chosen))
+
+
+def _offers(problem: Problem, vehicle: int, path: IntArray, held: int, pool: IntArray) -> _Offers:
+    before, after = path[held:-1], path[held + 1 :]
+    length_m = tour_length(problem, path)
+    kept_m = problem.finite[before, after] if len(path) > 2 else np.zeros(1)
+    added = problem.finite[np.ix_(pool, before)] + problem.finite[np.ix_(pool, after)] - kept_m
+    places = added.argmin(axis=1)
+    lengths = length_m + added[np.arange(len(pool)), places]
+    strain = problem.strain(np.append(lengths, length_m), np.full(len(pool) + 1, vehicle))
+    fits = problem.has_role[vehicle, pool] & (lengths <= problem.lengths_m[vehicle])
+    costs = np.where(fits, (strain[:-1] - strain[-1]) / problem.values[pool], np.inf)
+    return _Offers(costs=costs, places=held + 1 + places)

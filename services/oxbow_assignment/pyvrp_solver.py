@@ -1,0 +1,86 @@
+"""The joint problem in PyVRP's terms (N. A. Wouda, L. Lan and W. Kool, 2024): the only module that imports it.
+
+PyVRP counts in integers: here centimetres and hundredths of a second, rounded up, so that what fits there fits.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pyvrp import Client, Depot, Location, ProblemData, Solution, VehicleType, solve
+from pyvrp.stop import NoImprovement
+
+from oxbow.contracts import FloatArray
+from oxbow_assignment.problem import IntArray, Problem
+
+__all__ = ["solved"]
+
+PER_UNIT = 100
+"""Steps in a metre, and in a second."""
+
+PRIZE = 2.0
+"""How many times the durations of all vehicles' whole ranges the least value weighs, so that value comes first."""
+
+
+def solved(problem: Problem, *, patience: int, seed: int, within_s: float | None = None) -> list[IntArray]:
+    """Paths of least total duration, one a vehicle, among those that serve the greatest value.
+
+    Parameters
+    ----------
+    patience
+        Iterations without improvement after which the search ends.
+    within_s
+        The longest that any vehicle may take; by default as long as its range lasts.
+    """
+    data = _data(problem, within_s)
+    result = solve(data, NoImprovement(patience), seed=seed, collect_stats=False, display=False)
+    return _paths(problem, result.best)
+
+
+def _data(problem: Problem, within_s: float | None) -> ProblemData:
+    lengths, count = problem.lengths_m, len(problem.vehicles)
+    longest_s = float((lengths / problem.speeds_mps).sum())
+    prizes = _steps(PRIZE * longest_s * problem.values / problem.values.min())
+    far_m = 2.0 * max(float(lengths.max()), float(problem.finite.max()))
+    metres, seconds = [], []
+    for vehicle, speed_mps in enumerate(problem.speeds_mps):
+        own = problem.finite.copy()
+        barred = np.flatnonzero(~problem.has_role[vehicle])
+        own[barred], own[:, barred] = far_m, far_m
+        np.fill_diagonal(own, 0.0)
+        metres.append(_steps(own))
+        seconds.append(_steps(own / speed_mps))
+    types = [
+        VehicleType(
+            start_depot=vehicle,
+            end_depot=count + vehicle,
+            max_distance=int(lengths[vehicle] * PER_UNIT),
+            unit_distance_cost=0,
+            unit_duration_cost=1,
+            shift_duration=int(PER_UNIT * (longest_s if within_s is None else within_s)),
+            profile=vehicle,
+        )
+        for vehicle in range(count)
+    ]
+    return ProblemData(
+        locations=[Location(0, 0)] * len(problem.finite),
+        clients=[Client(target, prize=prize, required=False) for target, prize in enumerate(prizes.tolist())],
+        depots=[Depot(row) for row in [*problem.starts.tolist(), *problem.recoveries.tolist()]],
+        vehicle_types=types,
+        distance_matrices=metres,
+        duration_matrices=seconds,
+    )
+
+
+def _steps(figures: FloatArray) -> Any:
+    return np.ceil(figures * PER_UNIT).astype(np.int64)
+
+
+def _paths(problem: Problem, solution: Solution) -> list[IntArray]:
+    paths = [np.array(ends) for ends in zip(problem.starts, problem.recoveries, strict=True)]
+    for route in solution.routes():
+        targets = [stop.idx for stop in route if stop.is_client()]
+        start, end = paths[route.vehicle_type()]
+        paths[route.vehicle_type()] = np.array([start, *targets, end])
+    return paths
