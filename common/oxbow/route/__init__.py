@@ -10,6 +10,7 @@ from oxbow.route.funnel import funnel_line
 from oxbow.route.incenters import incenter_line
 from oxbow.route.mesh import Mesh
 from oxbow.route.route import Route, RouteMethod, Router
+from oxbow.route.tessellation import TessellationRouter
 from oxbow.route.visibility import VisibilityRouter
 
 __all__ = ["NO_DANGER", "Danger", "DangerZone", "Per", "Route", "RouteMethod", "Router", "make_router"]
@@ -34,6 +35,8 @@ def make_router(method: RouteMethod, water: Polygon | MultiPolygon, danger: Dang
     """
     mesh = Mesh.of(water, [zone.area.boundary for zone in danger.zones])
     match method:
+        case RouteMethod.TESSELLATION:
+            return TessellationRouter(mesh, danger)
         case RouteMethod.VISIBILITY:
             return VisibilityRouter(mesh, danger)
         case RouteMethod.FUNNEL:

@@ -1,8 +1,8 @@
 """Routes through a channel of triangles.
 
 M. Innocenti, L. Pollini and A. Bracci (2006), section 2.4.1, step c, after M. Kallmann (2005), *Path planning in
-triangulations*: the cheapest chain of adjacent triangles between start and goal, as its ways over the middles of the
-sides between triangles are counted. What route is drawn through the chain is the matter of each method.
+triangulations*: the cheapest chain of adjacent triangles between start and goal, as ways over the middles of the
+sides between triangles count. What route is drawn through the chain is the matter of each method.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from oxbow.route.route import (
     Route,
     RouteMethod,
     as_matrix,
+    checked_ends,
     checked_places,
     judged,
     place_names,
@@ -80,7 +81,7 @@ class ChannelRouter:
 
     def route(self, start: npt.ArrayLike, goal: npt.ArrayLike) -> Route:
         """The route through the cheapest channel; see `Router.route`."""
-        ends = checked_places([start, goal])
+        ends = checked_ends(start, goal)
         network = self._network(ends, ["start", "goal"])
         require_way(network.ways.costs[0, network.arrival + 1], ends)
         return judged(self.drawn(self._channel(network, 0, 1)), self.mesh, self.danger, self.method)
@@ -92,8 +93,8 @@ class ChannelRouter:
         costs = np.full((len(points), len(points)), np.inf)
         first, last = np.triu_indices(len(points), 1)
         reached = np.isfinite(network.ways.costs[first, network.arrival + last])
-        pairs = list(zip(first[reached], last[reached], strict=True))
-        lines = [self.drawn(self._channel(network, i, j)) for i, j in pairs]
+        pairs = np.column_stack([first, last])[reached]
+        lines = [self.drawn(self._channel(network, i, j)) for i, j in pairs.tolist()]
         costs[first[reached], last[reached]] = _line_costs(lines, self.danger)
         return as_matrix(costs, points, self.danger)
 
@@ -126,11 +127,12 @@ class ChannelRouter:
         point = np.repeat(at.place, 3)
         inner = self.mesh.twins.ravel()[side] >= 0
         out, into, point = side[inner], self.mesh.twins.ravel()[side[inner]], point[inner]
+        first, second = at.companions()
         arcs = self._arcs
         for tails, heads in (
             (departure + point, out),
             (into, arrival + point),
-            _same_triangle(at, departure, arrival),
+            (departure + first, arrival + second),
         ):
             arcs += Arcs.one_way(places, *distinct(tails, heads), self.danger)
         ways = cheapest_ways(len(places), arcs, np.arange(departure, arrival))
@@ -164,23 +166,10 @@ class _Network:
     ways: Ways
 
 
-def _same_triangle(at: Touches, departure: int, arrival: int) -> tuple[Indices, Indices]:
-    """Straight from one place to another in a triangle that both touch."""
-    order = np.argsort(at.triangle, kind="stable")
-    place, triangle = at.place[order], at.triangle[order]
-    tails, heads = [], []
-    for apart in range(1, int(np.bincount(triangle).max())):
-        same = triangle[apart:] == triangle[:-apart]
-        tails += [place[apart:][same], place[:-apart][same]]
-        heads += [place[:-apart][same], place[apart:][same]]
-    nobody = np.empty(0, dtype=np.intp)
-    return departure + np.concatenate([nobody, *tails]), arrival + np.concatenate([nobody, *heads])
-
-
 def _line_costs(lines: list[FloatArray], danger: Danger) -> FloatArray:
     """The costs of polylines."""
     if not lines:
         return np.empty(0)
     starts, ends = np.vstack([line[:-1] for line in lines]), np.vstack([line[1:] for line in lines])
     owner = np.repeat(np.arange(len(lines)), [len(line) - 1 for line in lines])
-    return np.bincount(owner, danger.costs(starts, ends), minlength=len(lines))
+    return np.asarray(np.bincount(owner, danger.costs(starts, ends)), dtype=np.float64)

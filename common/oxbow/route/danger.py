@@ -4,9 +4,9 @@ M. Innocenti, L. Pollini and A. Bracci (2006), section 3. A route of edges k tha
 does harm with P = 1 - prod(1 - P_k); an edge of length c costs c + c_max log(a / (1 - P_k)), so that costs add up
 along a route while probabilities multiply.
 
-Departures: a zone's probability holds for each metre or for each crossing, and P_k of an edge follows from how much
-of the zone it passes, so that P does not depend on how a route is divided into edges; without zones the
-term is left out altogether, whatever `a`; `a` is at least 1, for Dijkstra's algorithm takes no negative costs.
+Departures: a zone's probability holds for each metre or for each crossing, and P_k of an edge follows from how
+much of the zone it passes, so that P does not depend on how a route is divided into edges; without zones the term
+is left out altogether, whatever `a`; `a` is at least 1, for Dijkstra's algorithm takes no negative costs.
 """
 
 from __future__ import annotations

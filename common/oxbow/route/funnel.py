@@ -1,7 +1,7 @@
 """The shortest line through a channel of triangles: the funnel algorithm.
 
-D. T. Lee and F. P. Preparata (1984), *Euclidean shortest paths in the presence of rectilinear barriers*, as M. Kallmann
-(2005) uses it; M. Innocenti, L. Pollini and A. Bracci (2006), section 2.4.1, step d.
+D. T. Lee and F. P. Preparata (1984), *Euclidean shortest paths in the presence of rectilinear barriers*, as
+M. Kallmann (2005) uses it; M. Innocenti, L. Pollini and A. Bracci (2006), section 2.4.1, step d.
 """
 
 from __future__ import annotations

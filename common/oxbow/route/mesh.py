@@ -11,7 +11,7 @@ import numpy.typing as npt
 import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from shapely import LineString, MultiPolygon, Polygon, STRtree
+from shapely import LineString, MultiPolygon, Point, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray
@@ -33,6 +33,27 @@ class Touches:
 
     place: Indices
     triangle: Indices
+
+    def __add__(self, other: Touches) -> Touches:
+        return Touches(np.concatenate([self.place, other.place]), np.concatenate([self.triangle, other.triangle]))
+
+    def among(self, places: Indices) -> Touches:
+        """What some distinct places touch, numbered in their order."""
+        rank = np.full(max(self.place.max(initial=0), places.max(initial=0)) + 1, -1)
+        rank[places] = np.arange(len(places))
+        chosen = rank[self.place] >= 0
+        return Touches(rank[self.place[chosen]], self.triangle[chosen])
+
+    def companions(self) -> tuple[Indices, Indices]:
+        """Ordered pairs of places that touch the same triangle; a pair may occur repeatedly."""
+        order = np.argsort(self.triangle, kind="stable")
+        place, triangle = self.place[order], self.triangle[order]
+        first, second = [place[:0]], [place[:0]]
+        for apart in range(1, int(np.bincount(triangle, minlength=1).max())):
+            same = triangle[apart:] == triangle[:-apart]
+            first += [place[apart:][same], place[:-apart][same]]
+            second += [place[:-apart][same], place[apart:][same]]
+        return np.concatenate(first), np.concatenate(second)
 
 
 @dataclass(frozen=True)
@@ -117,12 +138,24 @@ class Mesh:
         ahead = np.roll(apexes, -1, axis=1) - apexes
         behind = np.roll(apexes, 1, axis=1) - apexes
         angle = np.arctan2(cross(ahead, behind), (ahead * behind).sum(axis=2))
-        return np.bincount(self.sectors, angle.ravel())
+        return np.asarray(np.bincount(self.sectors, angle.ravel()), dtype=np.float64)
 
     def clearance_m(self, line: LineString) -> float:
         """The least distance from a line to the shore."""
         _, distance_m = self._shore_index.query_nearest(line, return_distance=True, all_matches=False)
         return float(distance_m[0])
+
+    def is_clear(self, starts: FloatArray, ends: FloatArray) -> npt.NDArray[np.bool_]:
+        """Whether straight lines between places, both of shape (n, 2), meet no shore; shape (n,)."""
+        lines = np.asarray(shapely.linestrings(np.stack([starts, ends], axis=1)))
+        clear = np.ones(len(lines), dtype=np.bool_)
+        clear[self._shore_index.query(lines, predicate="intersects")[0]] = False
+        return clear
+
+    def holding(self, places: FloatArray) -> Touches:
+        """The triangles that touch each of some places, shape (n, 2); none for a place outside."""
+        points = np.asarray(shapely.points(places))
+        return Touches(*self._index.query(points, predicate="dwithin", distance=TOUCH_M))
 
     def touches(self, places: FloatArray, names: Sequence[str]) -> Touches:
         """The triangles that each of some places touches.
@@ -141,21 +174,19 @@ class Mesh:
         Infeasible
             A place lies outside the water.
         """
-        for number in np.flatnonzero(~np.isfinite(places).all(axis=1)):
+        for number in np.flatnonzero(~np.isfinite(places).all(axis=1)).tolist():
             raise InvalidMission(f"is {_text(places[number])}; expected finite metres", where=names[number])
-        points = np.asarray(shapely.points(places))
-        place, triangle = self._index.query(points, predicate="dwithin", distance=TOUCH_M)
-        for number in np.setdiff1d(np.arange(len(places)), place):
-            nearest, distance_m = self._index.query_nearest(points[number], return_distance=True)
+        touches = self.holding(places)
+        for number in sorted(set(range(len(places))) - set(touches.place.tolist())):
+            nearest, distance_m = self._index.query_nearest(Point(places[number]), return_distance=True)
             if distance_m[0] > ROUNDING_M:
                 raise Infeasible(
                     f"at {_text(places[number])} lies outside the water, {distance_m[0]:.3g} m from it;"
                     " expected a place in the water, not ashore or on an island",
                     where=names[number],
                 )
-            place = np.append(place, np.full(len(nearest), number))
-            triangle = np.append(triangle, nearest)
-        return Touches(place, triangle)
+            touches += Touches(np.full(len(nearest), number), nearest)
+        return touches
 
 
 def following(sides: Indices) -> Indices:
@@ -164,7 +195,7 @@ def following(sides: Indices) -> Indices:
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """a x b of plane vectors, over the last axis: positive where b lies to the left of a."""
+    """The cross product of plane vectors, over the last axis: positive where b lies to the left of a."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 

@@ -22,6 +22,7 @@ __all__ = [
     "RouteMethod",
     "Router",
     "as_matrix",
+    "checked_ends",
     "checked_places",
     "judged",
     "place_names",
@@ -143,6 +144,21 @@ def checked_places(places: npt.ArrayLike) -> FloatArray:
     if array.ndim != 2 or array.shape[1] != 2:
         raise InvalidMission(f"have shape {array.shape}; expected places of shape (n, 2)", where="points")
     return array
+
+
+def checked_ends(start: npt.ArrayLike, goal: npt.ArrayLike) -> FloatArray:
+    """Start and goal as an array of shape (2, 2).
+
+    Raises
+    ------
+    InvalidMission
+        One of them is not one place.
+    """
+    ends = [np.asarray(place, dtype=np.float64) for place in (start, goal)]
+    for place, name in zip(ends, ("start", "goal"), strict=True):
+        if place.shape != (2,):
+            raise InvalidMission(f"has shape {place.shape}; expected one place (x, y)", where=name)
+    return np.stack(ends)
 
 
 def require_way(cost: float, ends: FloatArray) -> None:

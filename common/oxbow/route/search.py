@@ -46,7 +46,7 @@ class Arcs:
 
 @dataclass(frozen=True)
 class Ways:
-    """The cheapest ways from some sources to all places: their costs, inf where none leads, and their last steps."""
+    """The cheapest ways from some sources to all places: their costs (inf where none leads), their last steps."""
 
     costs: FloatArray
     previous: Indices
@@ -65,7 +65,7 @@ def cheapest_ways(count: int, arcs: Arcs, sources: Indices) -> Ways:
     """Search a network of `count` places from some of them."""
     graph = coo_array((arcs.costs, (arcs.tails, arcs.heads)), shape=(count, count)).tocsr()
     costs, previous = dijkstra(graph, indices=sources, return_predecessors=True)
-    return Ways(costs, previous)
+    return Ways(costs, previous.astype(np.intp))
 
 
 def distinct(tails: Indices, heads: Indices) -> tuple[Indices, Indices]:

@@ -36,7 +36,7 @@ class Sights:
 
 @dataclass(frozen=True)
 class _Cones:
-    """Cones of view that enter triangles: the eye, the side entered, and the limits of view as seen from the eye."""
+    """Cones of view that enter triangles: the eye, the side entered, the limits of view as seen from the eye."""
 
     eye: Indices
     side: Indices
@@ -102,7 +102,7 @@ def _first_cones(mesh: Mesh, eyes: FloatArray, at: Touches) -> _Cones:
 
 
 def _parted(mesh: Mesh, cones: _Cones, apex: FloatArray) -> _Cones:
-    """The cones beyond the triangles entered, which part at the corner opposite; `apex` is as seen from the eye."""
+    """The cones beyond the triangles entered; they part at the corner opposite, `apex` as seen from the eye."""
     to_right, to_left = following(cones.side), following(following(cones.side))
     below_left, above_right = _is_left(cones.left, of=apex), _is_left(apex, of=cones.right)
     twins = mesh.twins.ravel()
@@ -118,9 +118,7 @@ def _parted(mesh: Mesh, cones: _Cones, apex: FloatArray) -> _Cones:
     )
 
 
-def _places_in(
-    cones: _Cones, eyes: FloatArray, places: FloatArray, held: Touches
-) -> tuple[Indices, Indices]:
+def _places_in(cones: _Cones, eyes: FloatArray, places: FloatArray, held: Touches) -> tuple[Indices, Indices]:
     """Eyes and the places that they see in the triangles that their cones have entered."""
     cone, place = _held(cones.side // 3, held)
     cones = cones[cone]

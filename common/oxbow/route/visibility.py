@@ -2,9 +2,9 @@
 
 M. Innocenti, L. Pollini and A. Bracci (2006), section 2.1: the vertices that see each other are joined, and
 Dijkstra's algorithm searches the graph. Departures: only corners round which a shortest route can bend are
-vertices of the graph (T. Lozano-Perez and M. A. Wesley 1979 take all), only edges that touch the shore at both ends
-without leading into it are kept, and sight is decided over a triangulation (`oxbow.route.sights`) and
-not by testing every pair against every edge.
+vertices of the graph (T. Lozano-Perez and M. A. Wesley 1979 take all), only edges that touch the shore at both
+ends without leading into it are kept, and sight is decided over a triangulation (`oxbow.route.sights`), not by
+testing every pair against every edge.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from oxbow.route.route import (
     Route,
     RouteMethod,
     as_matrix,
+    checked_ends,
     checked_places,
     judged,
     place_names,
@@ -57,7 +58,7 @@ class VisibilityRouter:
 
     def route(self, start: npt.ArrayLike, goal: npt.ArrayLike) -> Route:
         """The shortest route; see `Router.route`."""
-        ends = checked_places([start, goal])
+        ends = checked_ends(start, goal)
         places, arcs = self._network(ends, ["start", "goal"])
         departure, arrival = len(places) - 4, len(places) - 1
         ways = cheapest_ways(len(places), arcs, np.array([departure]))
