@@ -1,11 +1,11 @@
 """Balancing: triangles change hands along the borders of shares until every share has what is due to it.
 
-Balampanis, Maza and Ollero 2016, section VIII, propose to exchange border cells between vehicles. One by one, these
-make ragged borders and cut shares in two. Here a potential is spread over the giver's share, 0 beyond its
-border with the taker and 1 in its farthest triangle, harmonic between: by the maximum principle every triangle has
-a neighbour of lower and one of higher potential, so that what lies below any level hangs together with the taker,
-and what lies above with the farthest triangle. The level is chosen by area. Level lines of a harmonic function
-are short, and run across narrows.
+Balampanis, Maza and Ollero 2016, section VIII, propose to exchange border cells between vehicles. One by one,
+these make ragged borders and cut shares in two. Here a potential is spread over the giver's share, 0 beyond its
+border with the taker and 1 in its farthest triangle, harmonic between. By the maximum principle every triangle has
+a neighbour of lower and one of higher potential: what lies below any level hangs together with the taker, what
+lies above it with the farthest triangle. The level is chosen by area. Level lines of a harmonic function are short
+and run across narrows.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def balanced_shares(mesh: Mesh, share: Indices, due_m2: FloatArray) -> Indices:
     """
     count = len(due_m2)
     for _ in range(TRANSFERS * count):
-        areas = np.bincount(share, mesh.areas_m2, minlength=count)
+        areas = np.bincount(share, mesh.areas_m2, minlength=count).astype(float)
         if imbalance(areas, due_m2) <= TOLERANCE:
             break
         least_m2 = TOLERANCE * float(due_m2.min()) / 2
@@ -93,15 +93,16 @@ def _transfers(
     lengths = border_lengths_m(mesh, share, len(surplus_m2))
     neighbours: nx.Graph[int] = nx.from_numpy_array(lengths)
     tree = nx.maximum_spanning_tree(neighbours)
-    flows: nx.DiGraph[int] = nx.DiGraph()
+    transfers: list[tuple[int, int, float]] = []
     for one, other in tree.edges:
         rest = tree.copy()
         rest.remove_edge(one, other)
         flow_m2 = float(surplus_m2[list(nx.node_connected_component(rest, one))].sum())
         if abs(flow_m2) > least_m2:
-            flows.add_edge(*((one, other) if flow_m2 > 0 else (other, one)), area_m2=abs(flow_m2))
-    ready = [edge for edge in flows.edges(data="area_m2") if flows.in_degree(edge[0]) == 0]
-    return sorted(ready, key=lambda edge: -edge[2])
+            transfers.append((one, other, flow_m2) if flow_m2 > 0 else (other, one, -flow_m2))
+    takers = {taker for _, taker, _ in transfers}
+    ready = [transfer for transfer in transfers if transfer[0] not in takers]
+    return sorted(ready, key=lambda transfer: -transfer[2])
 
 
 @dataclass(frozen=True)
@@ -134,10 +135,11 @@ class _Giver:
         own, outward = share[there] == giver, share[there] == taker
         size = len(triangles)
         inner = coo_array((conductance[own], (row[own], number[there[own]])), shape=(size, size))
-        return cls(mesh, triangles, inner.tocsr(), np.bincount(row[outward], conductance[outward], minlength=size))
+        outlets = np.bincount(row[outward], conductance[outward], minlength=size).astype(float)
+        return cls(mesh, triangles, inner.tocsr(), outlets)
 
     def part(self, area_m2: float, tolerance_m2: float) -> Mask:
-        """The part of about this area to give, shape (m,): both it and the taker, and what is left, hang together."""
+        """The part of about this area to give, shape (m,); it hangs together with the taker, and the rest does."""
         own = np.zeros(len(self.mesh), dtype=bool)
         own[self.triangles] = True
         depth = propagate(self.mesh, self.triangles[self.outlets > 0], own).depth[self.triangles]

@@ -53,7 +53,7 @@ class Partition:
     @cached_property
     def areas_m2(self) -> FloatArray:
         """Area of every share, shape (k,)."""
-        return np.bincount(self.share, self.mesh.areas_m2, minlength=len(self.seeds))
+        return np.bincount(self.share, self.mesh.areas_m2, minlength=len(self.seeds)).astype(float)
 
     @cached_property
     def due_m2(self) -> FloatArray:
@@ -84,8 +84,8 @@ class Partition:
 def wavefront_partition(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None = None) -> Partition:
     """Share a mesh by antagonising wavefronts (Balampanis, Maza and Ollero 2016, Algorithm 1).
 
-    Waves of one speed run from the vehicles' starts; what capacities ask for is not looked at. Where vehicles start
-    from one triangle, all but the first are sent elsewhere first, as far from the others as the water allows.
+    Waves of one speed run from the vehicles' starts; what capacities ask for is not looked at. Where vehicles
+    start from one triangle, all but the first are sent elsewhere before, as far from the others as possible.
 
     Raises
     ------
@@ -100,8 +100,8 @@ def balanced_partition(mesh: Mesh, starts: Sequence[Place], capacities: FloatArr
     """Share a mesh in proportion to capacities, within `BALANCE`, every share connected.
 
     The wavefronts' shares are balanced (`oxbow_assignment.balancing`), their seeds move to their middles, and so
-    on; of all rounds, the shares with the shortest borders are taken. Where triangles are too large for balance, or
-    dead ends only one triangle wide, the mesh is divided further.
+    on; of all rounds, the shares with the shortest borders are taken. Where triangles are too large for balance,
+    or dead ends only one triangle wide, the mesh is divided further.
 
     Parameters
     ----------

@@ -128,7 +128,7 @@ class Mesh:
         return csr_array(one_way + one_way.T)
 
     def subdivided(self) -> Mesh:
-        """Every triangle divided in four of its shape, at the middles of its edges: those of t are 4 t to 4 t + 3."""
+        """Every triangle t divided in four of its shape, 4 t to 4 t + 3, at the middles of its edges."""
         sides = np.sort(self.triangles[:, SIDES].reshape(-1, 2), axis=1)
         edges, index = np.unique(sides, axis=0, return_inverse=True)
         a, b, c = self.triangles.T
