@@ -12,6 +12,7 @@ from oxbow_certificate.cover import CoverRadius, cover_radius, least_radius
 from oxbow_certificate.discrepancy import discrepancy
 from oxbow_certificate.distance import PathDistance
 from oxbow_certificate.headings import count_turns, directional_evenness
+from oxbow_certificate.kriging import kriging_variance
 from oxbow_certificate.legs import least_leg_distance
 from oxbow_certificate.region import JudgedSpace
 from oxbow_certificate.spread import DistanceSpread, distance_spread
@@ -56,6 +57,8 @@ def judge(request: CertifyRequest) -> Judgement:
     crossings = count_crossings(path)
     positions = discrepancy(space.judged, path, spacing_m, 2.0 * space.detail_m)
     meeting_legs = about_ends(space, ends, max(2.0 * request.safety_m, spacing_m))
+    variogram = request.variogram
+    kriging = kriging_variance(path, spread.places, variogram, least_m) if variogram else None
     certificate = Certificate(
         length_m=path.length,
         duration_s=path.length / request.speed_mps,
@@ -81,6 +84,8 @@ def judge(request: CertifyRequest) -> Judgement:
         discrepancy_ratio=positions.ratio if positions else None,
         directional_evenness=directional_evenness(path),
         turns=count_turns(path, least_m),
+        kriging_variance_mean=kriging.mean if kriging else None,
+        kriging_variance_max=kriging.max if kriging else None,
         worst_gap=cover.place,
     )
     return Judgement(certificate, space, cover, spread)

@@ -1,0 +1,151 @@
+"""How well a field can be told from its samples along a path: the kriging variance.
+
+Rendas and Li 2016, section 1.2, second approach: where a stochastic model of the field is known, the discrepancy
+between the true and the reconstructed field is replaced by its expected value. With a variogram and an unknown
+mean, the best linear reconstruction is ordinary kriging (Matheron 1963; Cressie 1993, section 3.2). Its expected
+squared error at a place depends on where the field is sampled, not on the values found: it is known beforehand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from scipy.spatial import KDTree
+from shapely import LineString
+
+from oxbow.contracts import FloatArray, Variogram, VariogramModel
+
+__all__ = ["KrigingVariance", "correlation", "kriging_variance", "local_variance", "sampled", "sampling_pitch"]
+
+PITCH = 0.1
+"""Samples of the path are at most so far apart, as a share of the variogram's range."""
+MOST_SAMPLES = 200_000
+NEAREST, SPREAD = 20, 12
+"""Samples that the field at a place is told from: see `local_variance`."""
+LEAST_NUGGET = 1e-9
+"""As a share of the sill: keeps the equations regular where a smooth field is sampled densely."""
+_CHUNK = 2_000
+
+_TWENTYFOLD = math.log(20.0)
+_MATERN32 = 4.743864518390577
+"""Where (1 + x) exp(-x) = 0.05."""
+
+_CORRELATIONS: dict[VariogramModel, Callable[[FloatArray], FloatArray]] = {
+    VariogramModel.EXPONENTIAL: lambda h: np.exp(-_TWENTYFOLD * h),
+    VariogramModel.SPHERICAL: lambda h: np.where(h < 1.0, 1.0 - 1.5 * h + 0.5 * h**3, 0.0),
+    VariogramModel.GAUSSIAN: lambda h: np.exp(-_TWENTYFOLD * h**2),
+    VariogramModel.MATERN32: lambda h: (1.0 + _MATERN32 * h) * np.exp(-_MATERN32 * h),
+}
+"""By distance / range: 0.05 at 1, but for the spherical model."""
+
+
+@dataclass(frozen=True)
+class KrigingVariance:
+    """Mean and maximum over a region of the kriging variance, as shares of the sill."""
+
+    mean: float
+    max: float
+
+
+def kriging_variance(
+    path: LineString, places: FloatArray, variogram: Variogram, least_radius_m: float
+) -> KrigingVariance:
+    """The kriging variance of a field sampled along a path.
+
+    Parameters
+    ----------
+    path
+        Where the field is sampled.
+    places : ndarray of shape (n, 2)
+        Where it is reconstructed: places spread evenly over a region.
+    variogram
+        How it varies.
+    least_radius_m
+        The least cover radius that a path of this length could have over the region.
+    """
+    samples = sampled(path, sampling_pitch(variogram, path, least_radius_m))
+    variances = local_variance(samples, places, variogram)
+    return KrigingVariance(mean=float(variances.mean()), max=float(variances.max()))
+
+
+def sampling_pitch(variogram: Variogram, path: LineString, least_radius_m: float) -> float:
+    """How far apart to sample a path, in metres: finely against the range, and as finely along legs as across.
+
+    Vehicles sample more often; their further samples would change little, and only for the better.
+    """
+    return max(min(PITCH * variogram.range_m, least_radius_m), path.length / MOST_SAMPLES)
+
+
+def sampled(path: LineString, pitch_m: float) -> FloatArray:
+    """Positions (n, 2) along a path, both ends among them, at equal distances of at most `pitch_m`."""
+    xy = shapely.get_coordinates(path)
+    at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
+    samples = np.linspace(0.0, at[-1], math.ceil(at[-1] / pitch_m) + 1)
+    return np.column_stack([np.interp(samples, at, xy[:, 0]), np.interp(samples, at, xy[:, 1])])
+
+
+def correlation(variogram: Variogram, distance_m: FloatArray) -> FloatArray:
+    """Covariance of the field at two places apart, as a share of the sill; the nugget is lost at any distance."""
+    nugget = max(variogram.nugget / variogram.sill, LEAST_NUGGET)
+    return (1.0 - nugget) * _CORRELATIONS[variogram.model](distance_m / variogram.range_m)
+
+
+def local_variance(samples: FloatArray, places: FloatArray, variogram: Variogram) -> FloatArray:
+    """Ordinary kriging variance at places, from a few samples for each; as a share of the sill, shape (n,).
+
+    Those are the nearest samples, which screen off the ones behind them, and some spread over all, which tell the
+    field's mean. Further samples could only lower the variance: it is never underrated.
+
+    Parameters
+    ----------
+    samples : ndarray of shape (m, 2)
+        Where the field is sampled.
+    places : ndarray of shape (n, 2)
+        Where it is reconstructed.
+    """
+    tree = KDTree(samples)
+    nearest = np.arange(1, min(NEAREST, len(samples)) + 1)
+    spread = np.linspace(0, len(samples), SPREAD, endpoint=False, dtype=np.intp)
+    variances = []
+    for chunk in np.split(places, range(_CHUNK, len(places), _CHUNK)):
+        near_m, near = map(np.asarray, tree.query(chunk, k=nearest))
+        used = samples[np.concatenate([near, np.broadcast_to(spread, (len(chunk), SPREAD))], axis=1)]
+        distance_m = np.linalg.norm(used - chunk[:, None], axis=2)
+        counts = distance_m > near_m[:, -1:]
+        counts[:, : len(nearest)] = True
+        variances.append(_variance(used, distance_m, counts, variogram))
+    return np.concatenate(variances)
+
+
+def _variance(
+    samples: FloatArray, distance_m: FloatArray, counts: npt.NDArray[np.bool_], variogram: Variogram
+) -> FloatArray:
+    """Variances (n,) at places from k samples each.
+
+    The weights w minimise 1 - 2 w.c + w.C w where they sum to 1; C is the correlation of the samples with one
+    another, c theirs with the place.
+
+    Parameters
+    ----------
+    samples : ndarray of shape (n, k, 2)
+        Where they are.
+    distance_m : ndarray of shape (n, k)
+        Of each to its place.
+    counts : ndarray of shape (n, k)
+        False where a sample may be given twice, and gets no weight.
+    """
+    apart = np.sqrt(((samples[:, :, None] - samples[:, None]) ** 2).sum(axis=3))
+    among = correlation(variogram, apart) * counts[:, :, None] * counts[:, None]
+    diagonal = np.arange(samples.shape[1])
+    among[:, diagonal, diagonal] = 1.0
+    towards = correlation(variogram, distance_m) * counts
+    simple, unit = np.moveaxis(np.linalg.solve(among, np.stack([towards, counts], axis=2)), 2, 0)
+    weights = simple + unit * ((1.0 - simple.sum(axis=1)) / unit.sum(axis=1))[:, None]
+    # Of the weights found, not by the shorter formula of the best ones: rounding cannot make it negative.
+    between = np.einsum("ni,nij,nj->n", weights, among, weights)
+    return np.asarray(1.0 - 2.0 * (weights * towards).sum(axis=1) + between)
