@@ -35,7 +35,7 @@ def least_leg_distance(path: LineString, spacing_m: float, excused: BaseGeometry
     The report takes the least distance between sampled points, which along a path is the sampling step. Here the
     points are places on two legs: stretches that are parallel to within 30 degrees, face each other (the shortest
     way between them is perpendicular to one of them), and are no neighbours along the path. Two straight stretches
-    are nearest at an end of one of them, so that the distance is exact.
+    are nearest at an end of one of them, so that no leg is missed between samples.
 
     Parameters
     ----------

@@ -5,6 +5,7 @@ import json
 import math
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 import shapely
@@ -17,6 +18,7 @@ from oxbow.errors import Infeasible
 from oxbow.mission import mission_json, read_mission
 from oxbow.pipeline import plan_mission
 from oxbow.recording import Layer, discard
+from oxbow.testing import nasty_polygons
 from oxbow_certificate.conformance import count_crossings
 from oxbow_certificate.cover import least_radius
 from oxbow_certificate.service import handle
@@ -143,6 +145,29 @@ def test_a_path_that_never_enters_the_water_still_gets_a_certificate():
 def test_nothing_left_by_the_safety_distance_is_infeasible():
     with pytest.raises(Infeasible):
         certified([(10, 10), (90, 90)], safety_m=60.0)
+
+
+def test_the_measures_of_even_rows():
+    judged = certified([(x, y) for k, y in enumerate(range(5, 100, 10)) for x in ((5, 95), (95, 5))[k % 2]])
+    assert judged.least_leg_distance_m == pytest.approx(10)
+    assert judged.turns == 18
+    assert judged.directional_evenness is not None
+    assert 0 < judged.directional_evenness < 0.15
+    assert judged.discrepancy_ratio is not None
+    assert judged.discrepancy_ratio < 0.8
+    assert judged.p99_ratio is not None
+    assert judged.p95_ratio <= judged.p99_ratio <= judged.q
+
+
+@pytest.mark.parametrize("shape", sorted(nasty_polygons()))
+def test_every_figure_of_any_water_is_finite(shape):
+    water = nasty_polygons()[shape]
+    path = shapely.shortest_line(
+        water.point_on_surface(), water.exterior.line_interpolate_point(0.3, normalized=True)
+    )
+    judged = certified(path.coords, Polygon(water.exterior), zones=tuple(map(Polygon, water.interiors)))
+    json.dumps(msgspec.to_builtins(judged), allow_nan=False)
+    assert judged.judged_area > 0
 
 
 def test_every_step_is_shown():

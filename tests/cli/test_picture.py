@@ -1,14 +1,17 @@
 """Pictures of missions, planned and not."""
 
+import json
 from pathlib import Path
 from xml.etree import ElementTree
 
 import matplotlib.image
+import msgspec
 import pytest
 
 from oxbow.errors import InvalidMission
-from oxbow.mission import read_mission
+from oxbow.mission import mission_json, parse_mission, read_mission
 from oxbow.pipeline import plan_mission
+from oxbow_cli.gaps import draw_gaps
 from oxbow_cli.local import local_call
 from oxbow_cli.picture import draw
 
@@ -36,6 +39,40 @@ def test_an_svg_names_the_site_and_the_figures(planned, tmp_path):
 def test_the_site_alone_is_drawn_without_a_path(tmp_path):
     draw(SITE, tmp_path / "site.svg")
     assert "no path yet" in (tmp_path / "site.svg").read_text()
+
+
+def warm_share(file):
+    """The share of pixels that say: farther than the least radius."""
+    red, _, blue = matplotlib.image.imread(file)[..., :3].transpose(2, 0, 1)
+    return (red > blue + 0.3).mean()
+
+
+def test_gaps_are_warm(planned, tmp_path):
+    draw_gaps(planned, tmp_path / "whole.png", width_px=500)
+    half = planned.master_path[: len(planned.master_path) // 2]
+    draw_gaps(msgspec.structs.replace(planned, master_path=half), tmp_path / "half.png", width_px=500)
+    assert warm_share(tmp_path / "half.png") > 4 * warm_share(tmp_path / "whole.png")
+
+
+def test_gaps_have_a_scale(planned, tmp_path):
+    draw_gaps(planned, tmp_path / "gaps.svg")
+    text = (tmp_path / "gaps.svg").read_text()
+    assert f"in least radii of {planned.plan.certificate.least_radius_m:.3g} m" in text
+
+
+def test_gaps_need_a_path(tmp_path):
+    with pytest.raises(InvalidMission, match="oxbow plan"):
+        draw_gaps(SITE, tmp_path / "gaps.png")
+
+
+def test_a_plan_of_an_earlier_version_is_still_read(planned, tmp_path):
+    document = json.loads(mission_json(planned))
+    for name in ("p99_distance_m", "p99_ratio", "least_leg_distance_m", "discrepancy", "discrepancy_ratio"):
+        del document["Plan"]["certificate"][name]
+    earlier = parse_mission(json.dumps(document).encode())
+    assert earlier.plan.certificate.p99_ratio is None
+    assert earlier.plan.certificate.q == planned.plan.certificate.q
+    draw(earlier, tmp_path / "plan.png", width_px=300)
 
 
 @pytest.mark.parametrize("name", ["plan.jpg", "plan"])
