@@ -29,7 +29,7 @@ NEAREST, SPREAD = 20, 12
 """Samples that the field at a place is told from: see `local_variance`."""
 LEAST_NUGGET = 1e-9
 """As a share of the sill: keeps the equations regular where a smooth field is sampled densely."""
-_CHUNK = 2_000
+_CHUNK = 1_000
 
 _TWENTYFOLD = math.log(20.0)
 _MATERN32 = 4.743864518390577
@@ -139,8 +139,9 @@ def _variance(
     counts : ndarray of shape (n, k)
         False where a sample may be given twice, and gets no weight.
     """
-    apart = np.sqrt(((samples[:, :, None] - samples[:, None]) ** 2).sum(axis=3))
-    among = correlation(variogram, apart) * counts[:, :, None] * counts[:, None]
+    x, y = samples[:, :, 0], samples[:, :, 1]
+    apart_m = np.hypot(x[:, :, None] - x[:, None], y[:, :, None] - y[:, None])
+    among = correlation(variogram, apart_m) * counts[:, :, None] * counts[:, None]
     diagonal = np.arange(samples.shape[1])
     among[:, diagonal, diagonal] = 1.0
     towards = correlation(variogram, distance_m) * counts
