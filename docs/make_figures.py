@@ -1,6 +1,6 @@
-"""Draw the figures of these documents: one example mission, stage by stage, as the stages themselves show it.
+"""Draw the figures of these documents: an example mission as its stages show it, and plans good and bad.
 
-``python docs/make_figures.py`` writes `docs/images/stages.png` and `docs/images/quality.png`.
+``python docs/make_figures.py`` writes `stages.png`, `quality.png`, `gaps.png` and `plans.png` in `docs/images`.
 """
 
 from __future__ import annotations
@@ -14,14 +14,17 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path as Outline
+from sample_plans import SQUARE, sample_plans
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.contracts import CriticalKind
+from oxbow.contracts import Certificate, CertifyRequest, CriticalKind
 from oxbow.mission import Mission, read_mission
 from oxbow.pipeline import plan_mission
 from oxbow.recording import Layer
+from oxbow_certificate.certify import certify
 from oxbow_certificate.distance import PathDistance
+from oxbow_cli.gaps import GAPS, MOST_RADII, draw_gaps
 from oxbow_cli.local import local_call
 
 FOLDER = Path(__file__).parent
@@ -38,7 +41,7 @@ Layers = dict[tuple[str, str], Layer]
 
 
 def main() -> None:
-    """Plan the example once, and draw it twice."""
+    """Plan the example once, and draw all figures."""
     mission = read_mission(FOLDER / "examples" / "lake.json")
     layers: Layers = {}
 
@@ -48,6 +51,8 @@ def main() -> None:
     planned = plan_mission(mission, call=local_call(keep))
     draw_stages(layers, FOLDER / "images" / "stages.png")
     draw_quality(layers, planned, FOLDER / "images" / "quality.png")
+    draw_gaps(planned, FOLDER / "images" / "gaps.png", width_px=900)
+    draw_plans(FOLDER / "images" / "plans.png")
 
 
 def draw_stages(layers: Layers, file: Path) -> None:
@@ -121,6 +126,35 @@ def draw_quality(layers: Layers, planned: Mission, file: Path) -> None:
     spread.set(xlabel="distance to the path / least radius", ylabel="share of the free space nearer than that")
     spread.set(xlim=(0.0, 1.15 * certificate.q), ylim=(0.0, 1.02))
     figure.savefig(file, dpi=110)
+
+
+def draw_plans(file: Path) -> None:
+    """Paths of one length over one square: their gaps and their measures."""
+    figure = Figure(figsize=(9.6, 7.9), layout="constrained")
+    for axes, (name, path) in zip(figure.subplots(2, 3).flat, sample_plans().items(), strict=True):
+        ends = path.coords[0], path.coords[-1]
+        measures = certify(CertifyRequest(outline=SQUARE, path=path, launch=ends[0], recovery=ends[1]))
+        west, south, east, north = SQUARE.bounds
+        x, y = np.meshgrid(np.linspace(west, east, 160), np.linspace(south, north, 160))
+        radii = PathDistance(path)(np.column_stack([x.ravel(), y.ravel()])) / measures.least_radius_m
+        extent = (west, east, south, north)
+        axes.imshow(radii.reshape(x.shape), extent=extent, origin="lower", cmap=GAPS, vmin=0.0, vmax=MOST_RADII)
+        _draw_lines(axes, [path], color=INK, linewidths=0.7)
+        axes.set_title(name, fontsize=11, color=INK, weight="bold")
+        axes.set_xlabel(_caption(measures), fontsize=9, color=INK)
+        axes.set(xticks=[], yticks=[])
+        axes.spines[:].set_color(SHORE)
+    figure.savefig(file, dpi=95)
+
+
+def _caption(measures: Certificate) -> str:
+    """What tells the sample plans apart."""
+    simple = "" if measures.is_simple else f", {measures.crossings} crossings"
+    return (
+        f"q {measures.q:.2f}   p95 {measures.p95_ratio:.2f}   mean {measures.mean_ratio:.2f}{simple}\n"
+        f"least leg distance {measures.least_leg_distance_m:.0f} m   {measures.turns} turns\n"
+        f"discrepancy ratio {measures.discrepancy_ratio:.2f}   evenness {measures.directional_evenness:.2f}"
+    )
 
 
 def _draw_cells(axes: Axes, layers: Layers) -> None:
