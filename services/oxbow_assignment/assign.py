@@ -19,7 +19,7 @@ from oxbow_assignment.clustering import Clusters, cluster_by_radius, fuzzy_c_mea
 from oxbow_assignment.exchange import exchanged
 from oxbow_assignment.insertion import inserted, trimmed
 from oxbow_assignment.matching import match
-from oxbow_assignment.ordering import best_path
+from oxbow_assignment.ordering import EXACT_MOST, best_path, exact_path
 from oxbow_assignment.problem import IntArray, Problem
 from oxbow_assignment.pseudo_coordinates import PseudoCoordinates, pseudo_coordinates
 
@@ -103,23 +103,21 @@ def assign(problem: Problem, clustering: Clustering | None = None) -> Clustered:
     """
     clustering = clustering or Clustering()
     targets = np.flatnonzero(problem.can_visit.any(axis=0))
-    idle = [np.array([start, end]) for start, end in zip(problem.starts, problem.recoveries, strict=True)]
+    vehicles = range(len(problem.vehicles))
     if not len(targets):
+        idle = [problem.path(vehicle, ()) for vehicle in vehicles]
         return Clustered(assignment_of(problem, idle), targets, None, np.empty(0, dtype=np.intp), 0.0)
     coordinates = pseudo_coordinates(problem.finite[np.ix_(targets, targets)])
     clusters = _clusters(problem, coordinates, clustering)
     owners = match(problem, clusters, targets)
-    paths = [
-        trimmed(
-            problem, vehicle, best_path(problem.finite, start, targets[owners[clusters.labels] == vehicle], end)
-        )
-        for vehicle, (start, end) in enumerate(idle)
-    ]
-    assignment = assignment_of(problem, mended(problem, paths, [0] * len(paths)))
+    own = owners[clusters.labels]
+    paths = [best_path(problem.finite, problem.path(vehicle, targets[own == vehicle])) for vehicle in vehicles]
+    fitting = [trimmed(problem, vehicle, path) for vehicle, path in enumerate(paths)]
+    assignment = assignment_of(problem, mended(problem, fitting, [0] * len(paths)))
     return Clustered(assignment, targets, clusters, owners, coordinates.stress)
 
 
-def mended(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -> Sequence[IntArray]:
+def mended(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -> list[IntArray]:
     """Paths after insertions and exchanges, in turns for as long as another target fits.
 
     Parameters
@@ -132,7 +130,14 @@ def mended(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -> 
     served = -1
     while served < sum(map(len, paths := exchanged(problem, inserted(problem, paths, held), held))):
         served = sum(map(len, paths))
-    return paths
+    return [_exact(problem, path, kept) for path, kept in zip(paths, held, strict=True)]
+
+
+def _exact(problem: Problem, path: IntArray, held: int) -> IntArray:
+    """A path in the best order behind its held targets, if it is short enough to find it."""
+    if len(path) - held > EXACT_MOST + 2:
+        return path
+    return np.concatenate([path[:held], exact_path(problem.finite, path[held:])])
 
 
 def _clusters(problem: Problem, coordinates: PseudoCoordinates, clustering: Clustering) -> Clusters:

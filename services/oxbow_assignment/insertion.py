@@ -14,16 +14,19 @@ from oxbow_assignment.problem import IntArray, Problem
 __all__ = ["inserted", "trimmed"]
 
 
-def trimmed(problem: Problem, vehicle: int, path: IntArray) -> IntArray:
-    """A path within its vehicle's range, of targets that it may visit: while it is too long, the target goes that
-    saves most metres for its value.
+def trimmed(problem: Problem, vehicle: int, path: IntArray, *, held: int = 0) -> IntArray:
+    """A path within its vehicle's range, of targets that it may visit.
+
+    While it is too long, the target goes that saves most metres for its value; the first `held` targets go last.
     """
     inner = path[1:-1]
     path = np.concatenate([path[:1], inner[problem.can_visit[vehicle, inner]], path[-1:]])
     while tour_length(problem, path) > problem.lengths_m[vehicle]:
         before, at, after = path[:-2], path[1:-1], path[2:]
         saved = problem.finite[before, at] + problem.finite[at, after] - problem.finite[before, after]
-        path = np.delete(path, 1 + int((saved / problem.values[at]).argmax()))
+        worth = saved / problem.values[at]
+        worth[:held] = -np.inf
+        path = np.delete(path, 1 + int(worth.argmax()))
     return path
 
 

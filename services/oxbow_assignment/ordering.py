@@ -34,36 +34,29 @@ def path_length(distances: FloatArray, path: IntArray) -> float:
     return float(distances[path[:-1], path[1:]].sum())
 
 
-def best_path(distances: FloatArray, start: int, targets: IntArray, end: int) -> IntArray:
-    """The shortest path from `start` through all `targets` to `end`; exact up to `EXACT_MOST` targets.
+def best_path(distances: FloatArray, path: IntArray) -> IntArray:
+    """The rows of a path in a better order: the shortest up to `EXACT_MOST` targets, a local optimum above.
 
     Parameters
     ----------
     distances : ndarray of shape (m, m)
         Symmetric and finite, in metres.
-    start, end
-        Rows of `distances`.
-    targets : ndarray of shape (n,)
-        Rows of `distances`, in any order.
-
-    Returns
-    -------
-    ndarray of shape (n + 2,)
+    path : ndarray of shape (n + 2,)
+        Rows of `distances`; the first and the last stay, those between are in any order.
     """
-    if len(targets) <= EXACT_MOST:
-        return exact_path(distances, start, targets, end)
-    return improved_path(distances, inserted_path(distances, start, targets, end))
+    if len(path) <= EXACT_MOST + 2:
+        return exact_path(distances, path)
+    return improved_path(distances, inserted_path(distances, path))
 
 
-def exact_path(distances: FloatArray, start: int, targets: IntArray, end: int) -> IntArray:
+def exact_path(distances: FloatArray, path: IntArray) -> IntArray:
     """The shortest path by dynamic programming over sets (M. Held and R. M. Karp, 1962; R. Bellman, 1962).
 
     `lengths[s, j]` is the least length from the start through the set s, a bit mask, ending at target j; sets
     of one size are one array operation.
     """
+    start, targets, end = path[0], path[1:-1], path[-1]
     n = len(targets)
-    if not n:
-        return np.array([start, end])
     between = distances[np.ix_(targets, targets)]
     lengths = np.full((1 << n, n), np.inf)
     lengths[1 << np.arange(n), np.arange(n)] = distances[start, targets]
@@ -80,10 +73,9 @@ def exact_path(distances: FloatArray, start: int, targets: IntArray, end: int) -
     return np.array([start, *targets[order[::-1]], end])
 
 
-def inserted_path(distances: FloatArray, start: int, targets: IntArray, end: int) -> IntArray:
+def inserted_path(distances: FloatArray, path: IntArray) -> IntArray:
     """A path by farthest insertion (D. J. Rosenkrantz, R. E. Stearns and P. M. Lewis, 1977)."""
-    path = np.array([start, end])
-    left = np.array(targets)
+    left, path = path[1:-1], path[[0, -1]]
     nearest = distances[np.ix_(left, path)].min(axis=1)
     while len(left):
         farthest = int(nearest.argmax())

@@ -89,6 +89,10 @@ class Problem:
         """How many targets there are."""
         return len(self.distances) - 2 * len(self.vehicles)
 
+    def path(self, vehicle: int, targets: Sequence[int] | IntArray) -> IntArray:
+        """The rows that a vehicle passes: its start, its targets and its recovery."""
+        return np.array([self.starts[vehicle], *targets, self.recoveries[vehicle]])
+
     @property
     def targets(self) -> slice:
         """The targets' rows."""

@@ -78,9 +78,7 @@ def _steps(figures: FloatArray) -> Any:
 
 
 def _paths(problem: Problem, solution: Solution) -> list[IntArray]:
-    paths = [np.array(ends) for ends in zip(problem.starts, problem.recoveries, strict=True)]
+    tours: list[list[int]] = [[] for _ in problem.vehicles]
     for route in solution.routes():
-        targets = [stop.idx for stop in route if stop.is_client()]
-        start, end = paths[route.vehicle_type()]
-        paths[route.vehicle_type()] = np.array([start, *targets, end])
-    return paths
+        tours[route.vehicle_type()] = [stop.idx for stop in route if stop.is_client()]
+    return [problem.path(vehicle, tour) for vehicle, tour in enumerate(tours)]
