@@ -59,7 +59,7 @@ def _ascii_grid(path: Path) -> Raster:
     while begin < len(words) and words[begin].lower() in _HEADER:
         begin += 2
     header = _Header(name, dict(zip(map(str.lower, words[:begin:2]), words[1:begin:2], strict=False)))
-    rows, columns, cell = header.count("nrows"), header.count("ncols"), header.number("cellsize")
+    columns, rows, cell = header.count("ncols"), header.count("nrows"), header.number("cellsize")
     if cell <= 0:
         raise InvalidMission(f"is {cell!r}; expected degrees > 0", where=f"{name}: cellsize")
     require_size(name, rows, columns)
