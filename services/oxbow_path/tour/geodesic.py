@@ -1,0 +1,149 @@
+"""Geodesic distances: the lengths of shortest ways inside the water.
+
+A shortest way in a polygon is straight but for corners of the shore (Lee and Preparata 1984). The graph over sites
+and corners joins those that see each other nearby, and the corners of every triangle of a constrained Delaunay
+triangulation, so that it is connected wherever the water is, however narrow. Its ways are inside the water; one
+that passes far from any corner that it could turn at may be a little longer than the shortest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from scipy.sparse import coo_array, csr_array, vstack
+from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
+from scipy.spatial import cKDTree
+from shapely import Polygon
+
+from oxbow.contracts import FloatArray
+
+__all__ = ["Geodesics", "Indices", "Shore"]
+
+Indices = npt.NDArray[np.intp]
+
+SITES_IN_SIGHT = 12
+"""How many of the nearest sites a site looks for."""
+
+CORNERS_IN_SIGHT = 8
+"""How many of the nearest corners of the shore a site or corner looks for."""
+
+LEAST_STEP_M = 1e-9
+"""A sparse matrix drops zeros."""
+
+CHUNK = 256
+"""So many sites are sources of one search, to bound its memory."""
+
+
+class Shore:
+    """The shore of a polygon of water: its triangulation, and which of its corners see each other nearby."""
+
+    def __init__(self, free: Polygon) -> None:
+        shapely.prepare(free)
+        self.free = free
+        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(free))
+        vertices = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)
+        self._triangles = shapely.STRtree(triangles)
+        self._corners, index = np.unique(vertices, axis=0, return_inverse=True)
+        self._sides = index.reshape(-1, 3)
+        near = _in_sight(self._corners, _nearest(self._corners, self._corners, CORNERS_IN_SIGHT), free)
+        self._pairs = np.vstack([near, *(self._sides[:, [k, k - 1]] for k in range(3))])
+
+    def geodesics(self, sites: FloatArray) -> Geodesics:
+        """The ways between some sites, shape (n, 2), of the water."""
+        n, places = len(sites), np.vstack([sites, self._corners])
+        _, triangle = self._triangles.query_nearest(shapely.points(sites), all_matches=False)
+        around = np.column_stack([np.repeat(np.arange(n), 3), n + self._sides[triangle].ravel()])
+        looks = [
+            _nearest(sites, sites, SITES_IN_SIGHT),
+            _nearest(sites, self._corners, CORNERS_IN_SIGHT) + np.array([0, n]),
+        ]
+        pairs = np.vstack([_in_sight(places, np.vstack(looks), self.free), around, n + self._pairs])
+        return Geodesics(n, places, _graph(places, pairs))
+
+
+@dataclass(frozen=True)
+class Geodesics:
+    """Shortest ways between sites inside the water.
+
+    `places` are the sites, then the corners of the shore; `graph` holds the distances of places in sight.
+    """
+
+    count: int
+    places: FloatArray
+    graph: csr_array[np.float64]
+
+    def near(self, limit_m: float) -> csr_array[np.float64]:
+        """Distances of all pairs of sites no farther apart than the limit, shape (n, n)."""
+        rows = []
+        for first in range(0, self.count, CHUNK):
+            sources = np.arange(first, min(first + CHUNK, self.count))
+            distance = dijkstra(self.graph, indices=sources, limit=limit_m)[:, : self.count]
+            row, column = np.nonzero(np.isfinite(distance) & (distance > 0.0))
+            rows.append(coo_array((distance[row, column], (row, column)), shape=distance.shape))
+        return csr_array(vstack(rows))
+
+    def spanning_tree(self) -> csr_array[np.float64]:
+        """The least tree over all sites, shape (n, n), each leg one way.
+
+        Two sites that the tree joins have neighbouring cells in the graph's Voronoi diagram (Mehlhorn 1988): one
+        search from all sites finds it.
+        """
+        sites = np.arange(self.count)
+        distance, _, nearest = dijkstra(self.graph, indices=sites, min_only=True, return_predecessors=True)
+        steps = coo_array(self.graph)
+        a, b = nearest[steps.row], nearest[steps.col]
+        length = distance[steps.row] + steps.data + distance[steps.col]
+        shortest_first = np.lexsort((b, a, length))
+        shortest_first = shortest_first[a[shortest_first] < b[shortest_first]]
+        a, b, length = a[shortest_first], b[shortest_first], length[shortest_first]
+        _, first = np.unique(a.astype(np.int64) * self.count + b, return_index=True)
+        shape = (self.count, self.count)
+        return csr_array(minimum_spanning_tree(coo_array((length[first], (a[first], b[first])), shape=shape)))
+
+    def from_site(self, site: int) -> FloatArray:
+        """Distances from one site to all, shape (n,)."""
+        return np.asarray(dijkstra(self.graph, indices=np.array([site]))[0, : self.count])
+
+    def way(self, order: Sequence[int] | Indices) -> FloatArray:
+        """The closed way through the sites in that order, shape (m, 2), its end equal to its start."""
+        starts, goals = np.asarray(order), np.roll(order, -1)
+        seen = (np.asarray(self.graph[starts, goals]).ravel() > 0.0) | (starts == goals)
+        parts = []
+        for start, goal, straight in zip(starts.tolist(), goals.tolist(), seen.tolist(), strict=True):
+            parts.append([start] if straight else self._between(start, goal)[:-1])
+        parts.append([int(starts[0])])
+        return self.places[np.concatenate(parts).astype(np.intp)]
+
+    def _between(self, start: int, goal: int) -> list[int]:
+        _, previous = dijkstra(self.graph, indices=np.array([start]), return_predecessors=True)
+        nodes = [goal]
+        while nodes[-1] != start:
+            nodes.append(int(previous[0, nodes[-1]]))
+        return nodes[::-1]
+
+
+def _nearest(points: FloatArray, others: FloatArray, count: int) -> Indices:
+    """Pairs of every point with the others nearest to it, shape (m, 2)."""
+    count = min(count + 1, len(others))
+    _, nearest = cKDTree(others).query(points, k=np.arange(1, count + 1))
+    pairs = np.column_stack([np.repeat(np.arange(len(points)), count), nearest.ravel()])
+    apart = (points[pairs[:, 0]] != others[pairs[:, 1]]).any(axis=1)
+    return np.asarray(pairs[apart])
+
+
+def _in_sight(places: FloatArray, pairs: Indices, free: Polygon) -> Indices:
+    """Those pairs of places between which a straight line stays in the water."""
+    return np.asarray(pairs[shapely.covers(free, shapely.linestrings(places[pairs]))])
+
+
+def _graph(places: FloatArray, pairs: Indices) -> csr_array[np.float64]:
+    """The symmetric graph of some pairs, with the distances of their ends."""
+    a, b = np.unique(np.sort(pairs, axis=1), axis=0).T
+    weight = np.hypot(*(places[a] - places[b]).T) + LEAST_STEP_M
+    both = (np.concatenate([a, b]), np.concatenate([b, a]))
+    n = len(places)
+    return csr_array(coo_array((np.concatenate([weight, weight]), both), shape=(n, n)))

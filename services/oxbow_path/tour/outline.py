@@ -1,0 +1,71 @@
+"""The outline of a tour: a closed path that cannot cross itself, whatever the tour.
+
+A tour of shortest ways may touch itself, and run twice along one way: at the corners of the shore that several
+legs turn round, and wherever the way in is the way out. A heuristic's tour may cross itself, too. So the path is
+not the tour but the boundary of the region that the tour encloses by the even-odd rule. Ways travelled twice
+become lanes: added to the region outside it, taken from it inside. Where parts of it only touch, a disc joins
+them. The holes that this leaves are opened as those of a walk round a tree are (`oxbow_path.walk`). What results
+is one region without holes, inside the water, whose boundary is simple by construction.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from shapely import LineString, Point, Polygon
+
+from oxbow.contracts import FloatArray
+from oxbow_path.walk import largest
+
+__all__ = ["enclosed"]
+
+QUAD_SEGS = 2
+"""Lanes have ends of few corners: every corner is a waypoint."""
+
+PARTING = 4
+"""A place where so many stretches of a tour end is one where it meets itself."""
+
+
+def enclosed(way: FloatArray, free: Polygon, lane_m: float) -> Polygon:
+    """The region that a closed way encloses, in one piece, perhaps with holes.
+
+    Parameters
+    ----------
+    way : array, shape (n, 2)
+        A way inside `free` that ends where it starts, perhaps without leaving that place.
+    free
+        The water.
+    lane_m
+        Half the width of a lane, and of the joints between parts that only touch.
+    """
+    stretches = shapely.get_parts(shapely.union_all([LineString(way)]))
+    if len(stretches) == 0:
+        return largest(Point(way[0]).buffer(lane_m).intersection(free))
+    faces = shapely.get_parts(shapely.polygonize(stretches))
+    region = shapely.union_all([Polygon(), *faces[_is_odd(faces, way)]])
+    twice = stretches[~shapely.covers(region.boundary, stretches)]
+    inside = shapely.covers(region, twice)
+    slits, lanes, joints = (
+        shapely.union_all(shapely.buffer(lines, lane_m, quad_segs=QUAD_SEGS))
+        for lines in (twice[inside], twice[~inside], _meetings(stretches))
+    )
+    return largest(region.difference(slits).union(lanes.union(joints).intersection(free)))
+
+
+def _is_odd(faces: npt.NDArray[np.object_], way: FloatArray) -> npt.NDArray[np.bool_]:
+    """Whether a line from a face to infinity crosses the way an odd number of times."""
+    inner = shapely.get_coordinates(shapely.point_on_surface(faces))
+    x, y = inner[:, None, 0], inner[:, None, 1]
+    (x0, y0), (x1, y1) = way[:-1].T, way[1:].T
+    spans = (y0 > y) != (y1 > y)
+    rise = np.where(y1 == y0, 1.0, y1 - y0)
+    right = x0 + (y - y0) / rise * (x1 - x0) > x
+    return np.asarray((spans & right).sum(axis=1) % 2 == 1)
+
+
+def _meetings(stretches: npt.NDArray[np.object_]) -> npt.NDArray[np.object_]:
+    """The places at which a tour meets itself."""
+    ends = np.vstack([shapely.get_point(stretches, k) for k in (0, -1)]).ravel()
+    places, count = np.unique(shapely.get_coordinates(ends), axis=0, return_counts=True)
+    return np.asarray(shapely.points(places[count >= PARTING]))

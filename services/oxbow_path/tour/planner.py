@@ -1,0 +1,236 @@
+"""The Tour planner: as many sites as the length allows, a tour through them, and its outline."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import shapely
+from shapely import LineString, Polygon
+
+from oxbow.contracts import FloatArray
+from oxbow.errors import Infeasible
+from oxbow_path.circuit import Circuit
+from oxbow_path.gaps import branch_to
+from oxbow_path.legs import ROUNDING_M
+from oxbow_path.remainder import with_remainder
+from oxbow_path.spacing import Budget
+from oxbow_path.task import Task
+from oxbow_path.tour.geodesic import Geodesics, Shore
+from oxbow_path.tour.local_search import shortened
+from oxbow_path.tour.outline import enclosed
+from oxbow_path.tour.pyvrp_solver import is_installed, polished
+from oxbow_path.tour.sites import clustered, low_discrepancy, with_gaps
+from oxbow_path.tour.solver import Solution, Solver
+from oxbow_path.tour.start import first_tour
+from oxbow_path.transect import Pattern, Trial, Waters, finished
+from oxbow_path.walk import Brush, Walk, clear_of_land, simply_connected
+
+__all__ = ["TourPlan", "TourTrial", "plan_tour"]
+
+ENOUGH = 0.97
+"""Share of the longest length that a path should use at least."""
+
+EVENNESS = 0.98
+"""The shortest tour of n sites over area A has about this length, times the root of n A.
+
+Of sites at random it would have 0.7124 (Beardwood, Halton and Hammersley 1959): clustering keeps them apart.
+"""
+
+TURNS = 8
+"""Trials before the best so far is taken."""
+
+LEAST_STEP = 0.1
+"""Least share of the way between two known counts that a trial lies from either."""
+
+SAMPLES = 25
+"""Low-discrepancy points per site."""
+
+MOST_SAMPLES = 250_000
+
+LEAST_SITES = 4
+"""Fewer sites have one tour only."""
+
+NEAR = 4.0
+"""Sites no farther apart than this may follow each other, in pitches."""
+
+GAP = 1.0
+"""Water farther than this from every site is given one more, in pitches."""
+
+LANE = 0.1
+"""Half width of a lane, in pitches."""
+
+REACH = 1.5
+"""How far water may stay from the path where an island's far side is left out, in half pitches."""
+
+
+@dataclass(frozen=True)
+class TourTrial:
+    """A path through one number of sites, and what led to it; geometry in the sweep frame.
+
+    `count` is how many clusters were asked for; `sites` are the launch and recovery points' entries, the clusters'
+    centres, and what was added far from all of these. `way` is the tour through them, `solver` what found it.
+    """
+
+    count: int
+    sites: FloatArray
+    way: LineString
+    solver: str
+    trial: Trial
+
+    @property
+    def path(self) -> LineString:
+        """From launch to recovery, simple and inside the free space but for its legs."""
+        return self.trial.path
+
+    @property
+    def length_m(self) -> float:
+        return self.trial.length_m
+
+    @property
+    def pitch_m(self) -> float:
+        """Distance of neighbouring sites, and about that of neighbouring legs."""
+        return self.trial.pattern.spacing_m
+
+
+@dataclass(frozen=True)
+class TourPlan:
+    """The chosen trial, and all in the order of trying; sweep frame."""
+
+    chosen: TourTrial
+    trials: tuple[TourTrial, ...]
+
+
+def plan_tour(task: Task, *, solver: Solver | None = None) -> TourPlan:
+    """Plan a path along a tour through points of low discrepancy (Rendas and Li 2016, section 1.2.1.3).
+
+    Parameters
+    ----------
+    task
+        The water, the longest length, the least spacing, the seed.
+    solver
+        What shortens tours; the best that is installed where absent.
+
+    Raises
+    ------
+    Infeasible
+        Even the shortest way from launch to recovery is longer than the vehicle can go.
+    """
+    budget = Budget(task.length_m, ENOUGH * task.length_m, task.least_spacing_m)
+    area_m2 = task.waters.free.area
+    most = max(1, int(area_m2 / task.least_spacing_m**2))
+    first = min(most, max(1, round((task.length_m / EVENNESS) ** 2 / area_m2)))
+    attempt = _Attempt(
+        task.waters, min(2 * SAMPLES * first, MOST_SAMPLES), task.request.seed, solver or _best_solver()
+    )
+    trials = _fitted(attempt, first, most, budget)
+    fitting = [trial for trial in trials if budget.fits(trial.length_m)]
+    if not fitting:
+        shortest_m = min(trial.length_m for trial in trials)
+        raise Infeasible(
+            f"is {task.request.length_m:.0f} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
+            "Master_length",
+        )
+    chosen = max(fitting, key=lambda trial: trial.length_m)
+    if chosen.length_m < budget.enough_m and chosen.count < most:
+        chosen = replace(chosen, trial=with_remainder(chosen.trial, task.waters, budget))
+    return TourPlan(chosen, trials)
+
+
+def _best_solver() -> Solver:
+    return polished if is_installed() else shortened
+
+
+@dataclass(frozen=True)
+class _Attempt:
+    """Plans a path through any number of sites."""
+
+    waters: Waters
+    samples_count: int
+    seed: int
+    solver: Solver
+
+    @cached_property
+    def _samples(self) -> FloatArray:
+        return low_discrepancy(self.waters.free, self.samples_count, seed=self.seed)
+
+    @cached_property
+    def _shore(self) -> Shore:
+        return Shore(self.waters.free)
+
+    def __call__(self, count: int) -> TourTrial:
+        waters = self.waters
+        pitch_m = math.sqrt(waters.free.area / count) if count else waters.spacing_m
+        sites = self._sites(count, pitch_m)
+        geodesics = self._shore.geodesics(sites)
+        solution = self._solution(geodesics, NEAR * pitch_m)
+        way = geodesics.way(solution.order)
+        lane_m = LANE * pitch_m
+        pattern = Pattern(pitch_m, REACH, 0.0)
+        walk = simply_connected(
+            enclosed(way, waters.free, lane_m),
+            waters.free,
+            waters.probe,
+            cut_width_m=2 * lane_m,
+            reach_m=pattern.reach_m,
+        )
+        reached = Walk(_reaching_entries(walk.region, waters, lane_m), walk.cuts, walk.enclosed)
+        trial = finished(waters, pattern, Circuit((), ()), reached)
+        return TourTrial(count, sites, LineString(way), solution.solver, trial)
+
+    def _sites(self, count: int, pitch_m: float) -> FloatArray:
+        entries = np.unique(shapely.get_coordinates(self.waters.entries), axis=0)
+        if count == 0:
+            return entries
+        centres = clustered(self._samples, count, self.waters.free)
+        return with_gaps(np.vstack([entries, centres]), self.waters.probe.points, GAP * pitch_m)
+
+    def _solution(self, geodesics: Geodesics, near_m: float) -> Solution:
+        """A short tour; of fewer than four sites there is but one."""
+        if geodesics.count < LEAST_SITES:
+            return Solution(np.arange(geodesics.count), "")
+        return self.solver(first_tour(geodesics, near_m), seed=self.seed)
+
+
+def _reaching_entries(region: Polygon, waters: Waters, half_width_m: float) -> Polygon:
+    """The region grown by bands to the entries that a cut has parted it from."""
+    for entry in waters.entries:
+        if not shapely.dwithin(region, entry, ROUNDING_M):
+            goals = waters.routes.goals_in(region)
+            branch = branch_to(shapely.get_coordinates(entry)[0], region, waters.routes, goals, half_width_m)
+            band = Brush(waters.free, half_width_m, 0.0).bands([branch])
+            region = clear_of_land(region.union(band), waters.free)
+    return region
+
+
+def _fitted(attempt: _Attempt, first: int, most: int, budget: Budget) -> tuple[TourTrial, ...]:
+    """Trials of different counts, until one uses the length well or no other count is left to try.
+
+    Should none fit, the last has no sites but the entries.
+    """
+    trials: dict[int, TourTrial] = {}
+    count = first
+    while count not in trials and len(trials) < TURNS:
+        trials[count] = trial = attempt(count)
+        if budget.fits(trial.length_m) and (trial.length_m >= budget.enough_m or count == most):
+            break
+        count = min(most, _next_count(trials, (budget.enough_m + budget.most_m) / 2))
+    if 0 not in trials and not any(budget.fits(trial.length_m) for trial in trials.values()):
+        trials[0] = attempt(0)
+    return tuple(trials.values())
+
+
+def _next_count(trials: Mapping[int, TourTrial], target_m: float) -> int:
+    """The count for a length, which grows as the root of the count; between two known where there are two."""
+    points = sorted((trial.length_m, math.sqrt(count)) for count, trial in trials.items())
+    too_short = [point for point in points if point[0] <= target_m]
+    too_long = [point for point in points if point[0] > target_m]
+    if too_short and too_long:
+        (short_m, low), (long_m, high) = too_short[-1], too_long[0]
+        share = min(max((target_m - short_m) / (long_m - short_m), LEAST_STEP), 1 - LEAST_STEP)
+        return round((low + share * (high - low)) ** 2)
+    length_m, root = (too_short or too_long)[-1 if too_short else 0]
+    return round((root * target_m / length_m) ** 2)

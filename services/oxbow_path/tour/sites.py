@@ -1,0 +1,98 @@
+"""Sites: points spread evenly over the water, for a tour to visit (Rendas and Li 2016, section 1.2.1.3)."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+from scipy.stats import qmc
+from shapely import Polygon
+
+from oxbow.contracts import FloatArray
+
+__all__ = ["clustered", "low_discrepancy", "with_gaps"]
+
+ROUNDS = 12
+"""Rounds of Lloyd's algorithm; the first points of the sequence are nearly even already."""
+
+
+def low_discrepancy(free: Polygon, count: int, *, seed: int) -> FloatArray:
+    """Points of low discrepancy over a polygon, by area.
+
+    The report keeps those points of a sequence over the bounding box that lie in the polygon. Here every point of
+    the Halton sequence is used: its first coordinate chooses a triangle of the polygon by area, what is left of
+    that coordinate and the second one choose a place in the triangle. The sequence is shifted at random, modulo 1
+    (Cranley and Patterson 1976).
+
+    Parameters
+    ----------
+    free
+        Where the points lie.
+    count
+        How many points.
+    seed
+        Of the random shift.
+
+    Returns
+    -------
+    array, shape (count, 2)
+        Its first points alone are spread evenly, too.
+    """
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(free))
+    corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+    end = np.cumsum(shapely.area(triangles))
+    shift = np.random.default_rng(seed).random(2)
+    sequence = (qmc.Halton(2, scramble=False).random(count) + shift) % 1.0
+    target = sequence[:, 0] * end[-1]
+    chosen = np.minimum(np.searchsorted(end, target, side="right"), len(end) - 1)
+    start = np.concatenate([[0.0], end])
+    left = np.clip((target - start[chosen]) / (start[chosen + 1] - start[chosen]), 0.0, 1.0)
+    from_corner, along = np.sqrt(left)[:, None], sequence[:, 1:]
+    a, b, c = np.moveaxis(corners[chosen], 1, 0)
+    return np.asarray((1 - from_corner) * a + from_corner * ((1 - along) * b + along * c))
+
+
+def clustered(samples: FloatArray, count: int, free: Polygon) -> FloatArray:
+    """The centres of `count` clusters of samples, by k-means (Lloyd 1982) started from the first samples.
+
+    A centre that lies on land, between two shores, is moved to the nearest sample.
+
+    Parameters
+    ----------
+    samples : array, shape (m, 2)
+        A low-discrepancy sequence inside `free`, much longer than `count`.
+    count
+        How many clusters, at most m.
+    free
+        The water (prepared or not).
+
+    Returns
+    -------
+    array, shape (count, 2)
+    """
+    centres = samples[:count]
+    for _ in range(ROUNDS):
+        _, owner = cKDTree(centres).query(samples)
+        size = np.bincount(owner, minlength=count)
+        sums = np.column_stack([np.bincount(owner, weights=axis, minlength=count) for axis in samples.T])
+        centres = np.where(size[:, None] > 0, sums / np.maximum(size, 1)[:, None], centres)
+    on_land = ~shapely.contains_xy(free, centres)
+    _, nearest = cKDTree(samples).query(centres[on_land])
+    centres[on_land] = samples[nearest]
+    return np.unique(centres, axis=0)
+
+
+def with_gaps(sites: FloatArray, points: FloatArray, reach_m: float) -> FloatArray:
+    """The sites, and points made sites, the farthest first, until none is farther than `reach_m` from one."""
+    distance, _ = cKDTree(sites).query(points)
+    gaps = points[np.argsort(-distance, kind="stable")[: np.count_nonzero(distance > reach_m)]]
+    if len(gaps) == 0:
+        return sites
+    index = cKDTree(gaps)
+    near = np.zeros(len(gaps), dtype=bool)
+    added = []
+    for number, gap in enumerate(gaps):
+        if not near[number]:
+            near[index.query_ball_point(gap, reach_m)] = True
+            added.append(gap)
+    return np.vstack([sites, added])
