@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.route.triangulation import Indices, triangulated, twins_of
+from oxbow.route.triangulation import Geometries, Indices, parted, triangulated, twins_of
 
 __all__ = ["ROUNDING_M", "Mesh", "Touches", "cross", "following"]
 
@@ -88,7 +88,7 @@ class Mesh:
         """
         if water.is_empty or not water.is_valid:
             raise InvalidMission("is empty or not a valid polygon", where="water")
-        vertices, corners = triangulated(water, outlines)
+        vertices, corners = triangulated(parted(water, outlines) if outlines else water)
         return cls(vertices, corners, twins_of(corners))
 
     @cached_property
@@ -102,7 +102,7 @@ class Mesh:
         return np.asarray(self.vertices[np.roll(self.corners, -1, axis=1).ravel()])
 
     @cached_property
-    def polygons(self) -> npt.NDArray[np.object_]:
+    def polygons(self) -> Geometries:
         """The triangles as polygons."""
         return np.asarray(shapely.polygons(self.vertices[self.corners]))
 
@@ -119,6 +119,11 @@ class Mesh:
     def _shore_index(self) -> STRtree:
         ends = np.stack([self.tails[self.shore], self.heads[self.shore]], axis=1)
         return STRtree(np.asarray(shapely.linestrings(ends)))
+
+    def shores_near(self, areas: Geometries) -> Geometries:
+        """The shore's sides that come within rounding of areas, as lines."""
+        near = self._shore_index.query(areas, predicate="dwithin", distance=ROUNDING_M)[1]
+        return np.asarray(self._shore_index.geometries[np.unique(near)])
 
     @cached_property
     def sectors(self) -> Indices:

@@ -12,22 +12,19 @@ from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray
 
-__all__ = ["Indices", "triangulated", "twins_of"]
+__all__ = ["Geometries", "Indices", "paired", "parted", "triangulated", "twins_of"]
 
 Indices = npt.NDArray[np.intp]
+Geometries = npt.NDArray[np.object_]
 
 
-def triangulated(
-    water: Polygon | MultiPolygon, outlines: Sequence[BaseGeometry] = ()
-) -> tuple[FloatArray, Indices]:
-    """The triangles of a region.
+def triangulated(faces: BaseGeometry | Geometries) -> tuple[FloatArray, Indices]:
+    """The triangles of polygons.
 
     Parameters
     ----------
-    water
-        A valid region.
-    outlines
-        Lines that triangles must not straddle, beside the shore.
+    faces
+        One valid region or an array of such. Where they border, they have the border's vertices in common.
 
     Returns
     -------
@@ -35,14 +32,13 @@ def triangulated(
     corners : ndarray of int, shape (n, 3)
         The vertices of each triangle, counterclockwise.
     """
-    faces = _faces(water, outlines) if outlines else water
     triangles = shapely.get_parts(shapely.get_parts(shapely.constrained_delaunay_triangles(faces)))
     xy = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, 2::-1]
     vertices, index = np.unique(xy.reshape(-1, 2), axis=0, return_inverse=True)
     return vertices, _without_flats(vertices, index.reshape(-1, 3))
 
 
-def _faces(water: Polygon | MultiPolygon, outlines: Sequence[BaseGeometry]) -> npt.NDArray[np.object_]:
+def parted(water: Polygon | MultiPolygon, outlines: Sequence[BaseGeometry]) -> Geometries:
     """The parts into which lines cut a region; neighbours have the vertices of their common border in common."""
     lines = shapely.get_parts(shapely.node(shapely.geometrycollections([water.boundary, *outlines])))
     faces = shapely.get_parts(shapely.polygonize(lines))
@@ -55,14 +51,19 @@ def twins_of(corners: Indices) -> Indices:
 
     Side j of a triangle runs from its corner j to its corner j + 1; sides are numbered 3 t + j.
     """
-    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    key = ends[:, 0] * (corners.max(initial=0) + 1) + ends[:, 1]
-    order = np.argsort(key, kind="stable")
-    pairs = np.flatnonzero(key[order[1:]] == key[order[:-1]])
-    twins = np.full(len(key), -1, dtype=np.intp)
-    twins[order[pairs]] = order[pairs + 1]
-    twins[order[pairs + 1]] = order[pairs]
+    one, other = paired(corners.ravel(), np.roll(corners, -1, axis=1).ravel())
+    twins = np.full(corners.size, -1, dtype=np.intp)
+    twins[one], twins[other] = other, one
     return twins.reshape(-1, 3)
+
+
+def paired(tails: Indices, heads: Indices) -> tuple[Indices, Indices]:
+    """Which sides run between the same two vertices: indices of the one and of the other."""
+    low, high = np.minimum(tails, heads), np.maximum(tails, heads)
+    key = low * (high.max(initial=0) + 1) + high
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(key[order[1:]] == key[order[:-1]])
+    return order[same], order[same + 1]
 
 
 def _without_flats(vertices: FloatArray, corners: Indices) -> Indices:

@@ -1,0 +1,49 @@
+"""The router of each method."""
+
+from __future__ import annotations
+
+from shapely import MultiPolygon, Polygon
+
+from oxbow.route.channel import ChannelRouter
+from oxbow.route.danger import NO_DANGER, Danger
+from oxbow.route.funnel import funnel_line
+from oxbow.route.incenters import incenter_line
+from oxbow.route.mesh import Mesh
+from oxbow.route.route import RouteMethod, Router
+from oxbow.route.tessellation import TessellationRouter
+from oxbow.route.visibility import VisibilityRouter
+
+__all__ = ["make_router", "router_on"]
+
+
+def make_router(method: RouteMethod, water: Polygon | MultiPolygon, danger: Danger = NO_DANGER) -> Router:
+    """The router of one method.
+
+    Parameters
+    ----------
+    method
+        How routes are found.
+    water
+        Where they may run, in planar metres; holes are islands. Parts of it may lie apart.
+    danger
+        Zones that may be travelled at a risk, and what one vehicle makes of them.
+
+    Raises
+    ------
+    InvalidMission
+        The water is empty or not a valid polygon.
+    """
+    return router_on(Mesh.of(water, [zone.area.boundary for zone in danger.zones]), method, danger)
+
+
+def router_on(mesh: Mesh, method: RouteMethod, danger: Danger) -> Router:
+    """The router of one method on triangulated water."""
+    match method:
+        case RouteMethod.VISIBILITY:
+            return VisibilityRouter(mesh, danger)
+        case RouteMethod.TESSELLATION:
+            return TessellationRouter(mesh, danger)
+        case RouteMethod.FUNNEL:
+            return ChannelRouter(mesh, danger, drawn=funnel_line, method=method)
+        case RouteMethod.INCENTERS:
+            return ChannelRouter(mesh, danger, drawn=incenter_line, method=method)

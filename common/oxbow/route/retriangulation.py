@@ -1,0 +1,182 @@
+"""Local changes of a triangulation.
+
+M. Kallmann, H. Bieri and D. Thalmann (2003), *Fully dynamic constrained Delaunay triangulations*: only triangles
+that a change affects are made anew. They insert vertices and edges one by one; here the triangles that meet the
+change are taken out as one cavity, GEOS triangulates it, and from its border C. L. Lawson's flips (1977) go on
+outwards until all is constrained Delaunay again.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from shapely import STRtree
+from shapely.geometry.base import BaseGeometry
+
+from oxbow.contracts import FloatArray
+from oxbow.route.mesh import ROUNDING_M, Mesh, following
+from oxbow.route.triangulation import Geometries, Indices, paired, triangulated, twins_of
+
+__all__ = ["GRID_M", "Site", "retriangulated"]
+
+GRID_M = 2.0**-20
+"""All vertices lie on a grid this fine (about 1 micrometre), so that what is cut out fits again when put back."""
+
+DELAUNAY_SLACK = 1e-12
+"""How far from one circle four vertices must be for a flip, as the sine of an angle."""
+
+
+class Site(Protocol):
+    """What the water is to be after a change."""
+
+    def shores_near(self, areas: Geometries) -> Geometries:
+        """All lines along which water may end that come within rounding of areas; some may run over land."""
+
+    def is_water(self, places: FloatArray) -> npt.NDArray[np.bool_]:
+        """Whether places, shape (n, 2), are in the water."""
+
+
+def retriangulated(mesh: Mesh, changed: BaseGeometry, site: Site) -> Mesh:
+    """The mesh after a change.
+
+    Parameters
+    ----------
+    mesh
+        The water before, on the grid.
+    changed
+        Where water has come or gone; on the grid.
+    site
+        The water afterwards, which differs only there.
+    """
+    cavity = _touched(mesh, changed)
+    while True:
+        faces = _hole(mesh, cavity, changed, site)
+        splice, loose = _spliced(mesh, cavity, faces)
+        if not len(loose):
+            return splice.legalised()
+        # A new vertex fell on the cavity's border: the triangles beyond have to take it in.
+        cavity = np.union1d(cavity, loose)
+
+
+def _hole(mesh: Mesh, cavity: Indices, changed: BaseGeometry, site: Site) -> Geometries:
+    """The water of a cavity after the change, as polygons.
+
+    All lines are noded together, the shores as they were given and not as earlier changes cut them: what
+    rounding did to a shore is undone with the obstacle that was there.
+    """
+    pieces = np.asarray(shapely.polygons(mesh.vertices[mesh.corners[cavity]]))
+    border = mesh.twins[cavity].ravel()
+    border = border[(border >= 0) & ~np.isin(border // 3, cavity)]
+    ends = mesh.vertices[mesh.corners.ravel()[np.stack([border, following(border)], axis=1)]]
+    parts = shapely.get_parts(shapely.geometrycollections([changed, *pieces]))
+    lines = np.concatenate([shapely.linestrings(ends), site.shores_near(parts)])
+    noded = shapely.union_all(lines, grid_size=GRID_M)
+    faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
+    middles = shapely.point_on_surface(faces)
+    inside = np.zeros(len(faces), dtype=np.bool_)
+    inside[STRtree(middles).query(parts, predicate="intersects")[1]] = True
+    inside[inside] = site.is_water(shapely.get_coordinates(middles[inside]))
+    return np.asarray(faces[inside])
+
+
+def _touched(mesh: Mesh, area: BaseGeometry) -> Indices:
+    """The triangles that meet an area, or did before vertices on its outline were rounded."""
+    low, high = np.reshape(area.bounds, (2, 2)) + np.array([[-ROUNDING_M], [ROUNDING_M]])
+    # On which sides of the area's box a vertex lies, as in D. Cohen and I. Sutherland's clipping.
+    outside = np.hstack([mesh.vertices < low, mesh.vertices > high]) @ np.array([1, 2, 4, 8], dtype=np.uint8)
+    near = np.flatnonzero(np.bitwise_and.reduce(outside[mesh.corners.T]) == 0)
+    triangles = shapely.polygons(mesh.vertices[mesh.corners[near]])
+    return np.asarray(near[shapely.dwithin(area, triangles, ROUNDING_M)])
+
+
+def _spliced(mesh: Mesh, cavity: Indices, faces: Geometries) -> tuple[_Splice, Indices]:
+    """The mesh with another triangulation in a cavity, and the triangles outside to which that does not fit."""
+    places, fresh = triangulated(faces)
+    vertices, number = _numbered(mesh, cavity, places)
+    kept = np.ones(len(mesh.corners), dtype=np.bool_)
+    kept[cavity] = False
+    rank = np.where(kept, np.cumsum(kept) - 1, -1)
+    border = mesh.twins[cavity].ravel()
+    border = border[(border >= 0) & kept[border // 3]]
+    first = 3 * np.count_nonzero(kept)
+    fresh_twins = twins_of(fresh)
+    corners = np.vstack([mesh.corners[kept], number[fresh]])
+    twins = np.vstack([_renumbered(mesh.twins[kept], rank), np.where(fresh_twins >= 0, fresh_twins + first, -1)])
+    outer = _renumbered(border, rank)
+    open_sides = np.concatenate([outer, first + np.flatnonzero(fresh_twins.ravel() < 0)])
+    one, other = paired(corners.ravel()[open_sides], corners.ravel()[following(open_sides)])
+    one, other = open_sides[one], open_sides[other]
+    twins.ravel()[one], twins.ravel()[other] = other, one
+    loose = border[twins.ravel()[outer] < 0] // 3
+    return _Splice(vertices, corners, twins, outer), loose
+
+
+def _numbered(mesh: Mesh, cavity: Indices, places: FloatArray) -> tuple[FloatArray, Indices]:
+    """All vertices, and the numbers of places among them: those that the cavity had keep theirs."""
+    old = np.unique(mesh.corners[cavity])
+    number = {
+        place: int(vertex) for place, vertex in zip(map(tuple, mesh.vertices[old].tolist()), old, strict=True)
+    }
+    new = [place for place in map(tuple, places.tolist()) if place not in number]
+    number |= {place: len(mesh.vertices) + rank for rank, place in enumerate(new)}
+    vertices = np.vstack([mesh.vertices, np.reshape(new, (-1, 2))])
+    return vertices, np.array([number[place] for place in map(tuple, places.tolist())], dtype=np.intp)
+
+
+def _renumbered(sides: Indices, rank: Indices) -> Indices:
+    """Sides after their triangles have new numbers; -1 where the triangle is gone or the side was shore."""
+    triangle = rank[sides // 3]
+    return np.where((sides >= 0) & (triangle >= 0), 3 * triangle + sides % 3, -1)
+
+
+@dataclass(frozen=True)
+class _Splice:
+    """A triangulation that may not be Delaunay at some sides."""
+
+    vertices: FloatArray
+    corners: Indices
+    twins: Indices
+    suspects: Indices
+
+    def legalised(self) -> Mesh:
+        """The constrained Delaunay triangulation that flips lead to; without vertices that no triangle has."""
+        pending = self.suspects.tolist()
+        while pending:
+            side = pending.pop()
+            twin = int(self.twins.ravel()[side])
+            if twin >= 0 and not self._is_delaunay(side, twin):
+                pending += self._flip(side, twin)
+        used = np.zeros(len(self.vertices), dtype=np.bool_)
+        used[self.corners] = True
+        return Mesh(self.vertices[used], (np.cumsum(used) - 1)[self.corners], self.twins)
+
+    def _is_delaunay(self, side: int, twin: int) -> bool:
+        """Whether the angles opposite a side and its twin come to half a turn at most."""
+        sines, cosines = [], []
+        for t, j in (divmod(side, 3), divmod(twin, 3)):
+            (ax, ay), (bx, by), (cx, cy) = self.vertices[self.corners[t, [j, j - 2, j - 1]]].tolist()
+            scale = math.hypot(ax - cx, ay - cy) * math.hypot(bx - cx, by - cy)
+            sines.append(((ax - cx) * (by - cy) - (ay - cy) * (bx - cx)) / scale)
+            cosines.append(((ax - cx) * (bx - cx) + (ay - cy) * (by - cy)) / scale)
+        sine: float = sines[0] * cosines[1] + cosines[0] * sines[1]
+        return sine >= -DELAUNAY_SLACK
+
+    def _flip(self, side: int, twin: int) -> list[int]:
+        """Exchange the diagonal of two triangles' quadrangle; the four sides round it."""
+        (t, j), (u, k) = divmod(side, 3), divmod(twin, 3)
+        a, b, c = self.corners[t, [j, j - 2, j - 1]].tolist()
+        d = int(self.corners[u, k - 1])
+        bc, ca = self.twins[t, j - 2], self.twins[t, j - 1]
+        ad, db = self.twins[u, k - 2], self.twins[u, k - 1]
+        self.corners[t], self.corners[u] = (a, d, c), (d, b, c)
+        self.twins[t], self.twins[u] = (ad, 3 * u + 2, ca), (db, bc, 3 * t + 1)
+        around = [3 * t, 3 * t + 2, 3 * u, 3 * u + 1]
+        for outside, inside in zip((ad, ca, db, bc), around, strict=True):
+            if outside >= 0:
+                self.twins.ravel()[outside] = inside
+        return around
