@@ -17,7 +17,7 @@ from oxbow.errors import InvalidMission
 from oxbow_assignment.assignment import Assignment, assignment_of
 from oxbow_assignment.clustering import Clusters, cluster_by_radius, fuzzy_c_means, k_means
 from oxbow_assignment.exchange import exchanged
-from oxbow_assignment.insertion import inserted, trimmed
+from oxbow_assignment.insertion import inserted, traded, trimmed
 from oxbow_assignment.matching import match
 from oxbow_assignment.ordering import EXACT_MOST, best_path, exact_path
 from oxbow_assignment.problem import IntArray, Problem
@@ -118,7 +118,7 @@ def assign(problem: Problem, clustering: Clustering | None = None) -> Clustered:
 
 
 def mended(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -> list[IntArray]:
-    """Paths after insertions and exchanges, in turns for as long as another target fits.
+    """Paths after insertions, exchanges and trades, in turns until nothing more is gained.
 
     Parameters
     ----------
@@ -127,10 +127,12 @@ def mended(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -> 
     held
         How many leading targets of each path stay in front.
     """
-    served = -1
-    while served < sum(map(len, paths := exchanged(problem, inserted(problem, paths, held), held))):
-        served = sum(map(len, paths))
-    return [_exact(problem, path, kept) for path, kept in zip(paths, held, strict=True)]
+    while True:
+        paths = exchanged(problem, inserted(problem, paths, held), held)
+        traded_paths = traded(problem, paths, held)
+        if all(path is before for path, before in zip(traded_paths, paths, strict=True)):
+            return [_exact(problem, path, kept) for path, kept in zip(paths, held, strict=True)]
+        paths = traded_paths
 
 
 def _exact(problem: Problem, path: IntArray, held: int) -> IntArray:

@@ -13,7 +13,9 @@ from oxbow_assignment.problem import Objective, Problem
 SIDE_M = 1_000.0
 
 
-def vehicle(place=(0.0, 0.0), *, name="boat", length_m=1e5, speed_mps=1.0, role=Role.SLAVE, recovery=None) -> Vehicle:
+def vehicle(
+    place=(0.0, 0.0), *, name="boat", length_m=1e5, speed_mps=1.0, role=Role.SLAVE, recovery=None
+) -> Vehicle:
     return Vehicle(
         name=name, role=role, speed_mps=speed_mps, length_m=length_m, start=place, recovery=recovery or place
     )
@@ -33,7 +35,13 @@ def problem(
 
 
 def random_problem(
-    seed: int, targets: int, vehicles: int, *, length_m: float = 1e5, objective: Objective = Objective.TOTAL, **more
+    seed: int,
+    targets: int,
+    vehicles: int,
+    *,
+    length_m: float = 1e5,
+    objective: Objective = Objective.TOTAL,
+    **more,
 ) -> Problem:
     """Targets and starts anywhere in a square; speeds of 1 to 2 m/s, recoveries apart from starts."""
     random = np.random.default_rng(seed)

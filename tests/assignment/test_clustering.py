@@ -54,7 +54,7 @@ def test_stress_is_nothing_where_all_are_equally_far_apart():
 def test_targets_on_two_sides_of_a_wall_are_in_different_clusters():
     """Figure 4 of the report: near as the crow flies, far along the route."""
     west = np.column_stack([np.full(6, 45.0), np.linspace(0, 100, 6)])
-    east = west + [10.0, 0.0]
+    east = west + np.array([10.0, 0.0])
     round_the_end = [50.0, 2_000.0]
     there, back = cdist(west, [round_the_end]), cdist([round_the_end], east)
     distances = np.block([[cdist(west, west), there + back], [(there + back).T, cdist(east, east)]])
@@ -174,7 +174,7 @@ def test_a_target_that_has_faded_away_founds_no_cluster():
         (lambda c: k_means(c, 2, weights=np.ones(4)), "weights: expected 5"),
         (lambda c: cluster_by_radius(c, -1.0), "radius_m: is -1.0 m"),
         (lambda c: cluster_by_radius(c, np.nan), "radius_m: is nan m"),
-        (lambda c: faded(np.zeros(1), 0.0), "fade_s: is 0.0 s"),
+        (lambda _: faded(np.zeros(1), 0.0), "fade_s: is 0.0 s"),
     ],
 )
 def test_bad_requests_are_named(ask, says):
