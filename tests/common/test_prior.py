@@ -10,11 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, MultiPoint, MultiPolygon, Point, Polygon, box
 
+from oxbow.codec import decode, encode
 from oxbow.contracts import Variogram, VariogramModel
 from oxbow.errors import InvalidMission
 from oxbow.mission import mission_json, parse_mission
+from oxbow.pipeline import plan_mission
+from oxbow.plan import PlanOptions
 from oxbow.prior import PriorFeature, PriorModel, parse_prior, prior_document
 from oxbow.site import Site
+from oxbow_cli.local import local_call
 
 SQUARE = [(1.0, 46.0), (1.02, 46.0), (1.02, 46.02), (1.0, 46.02)]
 
@@ -219,3 +223,18 @@ def test_a_model_survives_writing_and_reading(weight, value, name, geometry):
     one = PriorFeature(geometry=geometry, weight=weight, value=value, properties={"name": name}, extra={"id": 3})
     prior = PriorModel(features=(one,), variogram=Variogram(**CLAY), extra={"title": name})
     assert parse_prior(json.dumps(prior_document(prior) | {"variogram": CLAY}).encode()) == prior
+
+
+def test_the_stages_get_what_they_need_of_it():
+    asked = {}
+    call = local_call()
+
+    def noting(endpoint, request):
+        asked[endpoint.stage] = decode(encode(request), endpoint.request)
+        return call(endpoint, request)
+
+    known = mission(collection(feature(NEAR, weight=2), variogram=CLAY))
+    plan_mission(known, PlanOptions(time_limit_s=20.0), call=noting)
+    assert asked["path"].weighted_areas == Site.of(known).weighted_areas
+    assert asked["path"].time_limit_s == 20.0
+    assert asked["certificate"].variogram == Variogram(**CLAY)

@@ -45,6 +45,7 @@ def test_content_makes_a_difference(change: dict[str, Any]) -> None:
 def test_options_make_a_difference_but_not_the_id_or_the_deadline() -> None:
     assert submission(seed="1").fingerprint != submission().fingerprint
     assert submission(heading_rad="0.5").fingerprint != submission().fingerprint
+    assert submission(time_limit_s="5").fingerprint != submission().fingerprint
     assert submission(deadline_s="7", id="lake").fingerprint == submission().fingerprint
 
 
@@ -67,6 +68,7 @@ parameters = st.builds(
     seed=st.integers(0, 2**53),
     heading_rad=st.none() | st.floats(-10, 10),
     tolerance_m=st.none() | st.floats(0, 1e6),
+    time_limit_s=st.none() | st.floats(1e-3, 1e6),
     id=st.none() | st.from_regex(r"[A-Za-z0-9_.-]+", fullmatch=True),
     deadline_s=st.floats(1e-3, 1e6),
 )
@@ -88,6 +90,7 @@ def test_parameters_survive_the_way_through_a_selector(given_parameters: Submiss
         ({"deadline_s": "0"}, "deadline_s: is 0.0"),
         ({"deadline_s": "nan"}, "deadline_s: is nan"),
         ({"seed": "-1"}, "seed: is -1"),
+        ({"time_limit_s": "0"}, "time_limit_s: is 0.0"),
         ({"id": "a/b"}, "id: is 'a/b'"),
         ({"id": "*"}, r"id: is '\*'"),
     ],
