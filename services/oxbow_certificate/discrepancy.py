@@ -12,10 +12,12 @@ from scipy.stats import qmc
 from shapely import LineString, MultiPolygon
 
 from oxbow.contracts import FloatArray
+from oxbow_certificate.axes import long_side, turned
 
 __all__ = ["Discrepancy", "discrepancy", "unit_square"]
 
 _MOST_POSITIONS = 4_000
+_GOLDEN_RATIO = (1 + math.sqrt(5)) / 2
 
 
 class _Edges(NamedTuple):
@@ -39,10 +41,10 @@ def discrepancy(
 ) -> Discrepancy | None:
     """Discrepancy of a path's positions in a region (Rendas and Li 2016, section 1.2.1, entropy/discrepancy).
 
-    The positions are at equal intervals of `spacing_m`, or longer ones where there would be more than 4 000. They
-    are brought to the unit square by `unit_square`, along the long side of the region's least rectangle, and their
-    centred discrepancy (Hickernell 1998) is taken there. It is the same for mirrored and swapped axes, so that it
-    does not change where region and path are turned together.
+    There is a position on each `spacing_m` of the path, or on longer pieces where there would be more than 4 000.
+    They are brought to the unit square by `unit_square`, along the long side of the region's least rectangle, and
+    their centred discrepancy (Hickernell 1998) is taken there. It is the same for mirrored and swapped axes, so
+    that it does not change where region and path are turned together.
 
     Parameters
     ----------
@@ -57,9 +59,9 @@ def discrepancy(
     positions = _positions(path, min(math.ceil(path.length / spacing_m), _MOST_POSITIONS))
     shapely.prepare(region)
     positions = positions[shapely.dwithin(region, shapely.points(positions), tolerance_m)]
-    along = _long_side(region)
-    upright = shapely.transform(region, lambda xy: _turned(xy, along))
-    square = unit_square(upright, _turned(positions, along))
+    along = long_side(region)
+    upright = shapely.transform(region, lambda xy: turned(xy, along))
+    square = unit_square(upright, turned(positions, along))
     if not len(square):
         return None
     squared = float(qmc.discrepancy(square, method="CD"))
@@ -127,22 +129,8 @@ def _edges(region: MultiPolygon) -> _Edges:
 
 
 def _positions(path: LineString, count: int) -> FloatArray:
-    """The middles (count, 2) of equal lengths of `path`."""
+    """A position on each of `count` equal lengths of `path`, at offsets that fall into step with no legs."""
     xy = shapely.get_coordinates(path)
     at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
-    wanted = (np.arange(count) + 0.5) / count * at[-1]
+    wanted = (np.arange(count) + np.arange(count) / _GOLDEN_RATIO % 1.0) / count * at[-1]
     return np.column_stack([np.interp(wanted, at, xy[:, axis]) for axis in (0, 1)])
-
-
-def _long_side(region: MultiPolygon) -> FloatArray:
-    """The direction (2,) of the longer side of the least rectangle about `region`."""
-    corners = shapely.get_coordinates(shapely.oriented_envelope(region))
-    sides = np.diff(corners[:3], axis=0)
-    longer = sides[np.argmax(np.hypot(*sides.T))]
-    return np.asarray(longer / np.hypot(*longer))
-
-
-def _turned(xy: FloatArray, along: FloatArray) -> FloatArray:
-    """Coordinates along a direction and to its left."""
-    east, north = along
-    return np.asarray(xy @ np.array([[east, -north], [north, east]]))

@@ -10,6 +10,7 @@ import shapely
 from shapely import LineString, STRtree
 
 from oxbow.contracts import FloatArray
+from oxbow_certificate.axes import main_direction, turned
 
 __all__ = ["PathDistance", "segments_of"]
 
@@ -26,12 +27,18 @@ _PIECES = 2_000
 
 
 class PathDistance:
-    """Exact distance from places to a path, by an R-tree of its segments (STR, Leutenegger et al. 1997)."""
+    """Exact distance from places to a path, by an R-tree of its segments (STR, Leutenegger et al. 1997).
+
+    The axes lie along the path, so that the boxes of parallel legs are narrow.
+    """
 
     def __init__(self, path: LineString) -> None:
-        self._tree = STRtree(segments_of(path.segmentize(path.length / _PIECES)))
+        self._along = main_direction(path)
+        upright = LineString(turned(shapely.get_coordinates(path), self._along))
+        self._tree = STRtree(segments_of(upright.segmentize(path.length / _PIECES)))
 
     def __call__(self, places: FloatArray) -> FloatArray:
         """Distances (n,) in metres from `places` (n, 2) to the path."""
-        _, distances = self._tree.query_nearest(shapely.points(places), return_distance=True, all_matches=False)
+        points = shapely.points(turned(places, self._along))
+        _, distances = self._tree.query_nearest(points, return_distance=True, all_matches=False)
         return np.asarray(distances)

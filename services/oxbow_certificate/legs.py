@@ -12,6 +12,7 @@ from shapely import LineString, STRtree
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray
+from oxbow_certificate.axes import main_direction, turned
 from oxbow_certificate.distance import segments_of
 
 __all__ = ["least_leg_distance"]
@@ -25,7 +26,7 @@ NEIGHBOURS = 2.0
 REACH = 4.0
 """Legs are looked for within so many spacings."""
 
-_MOST_PIECES = 20_000
+_MOST_PIECES = 5_000
 _CHUNK = 1024
 
 
@@ -51,6 +52,9 @@ def least_leg_distance(path: LineString, spacing_m: float, excused: BaseGeometry
     float or None
         None where no two legs face each other within four spacings.
     """
+    along = main_direction(path)
+    excused = shapely.transform(excused, lambda xy: turned(xy, along))
+    path = LineString(turned(shapely.get_coordinates(path), along))
     pieces = _Pieces.of(path, max(spacing_m, path.length / _MOST_PIECES))
     asked = np.flatnonzero(~shapely.intersects_xy(excused, pieces.ends))
     # Most paths have legs within a spacing: a wider search would find the same.
