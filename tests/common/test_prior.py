@@ -2,7 +2,10 @@
 
 import json
 import math
+from contextlib import nullcontext
+from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 import shapely
@@ -238,3 +241,29 @@ def test_the_stages_get_what_they_need_of_it():
     assert asked["path"].weighted_areas == Site.of(known).weighted_areas
     assert asked["path"].time_limit_s == 20.0
     assert asked["certificate"].variogram == Variogram(**CLAY)
+
+
+SCHEMA = json.loads((Path(__file__).parents[2] / "docs/mission-file.schema.json").read_text())
+
+
+@pytest.mark.parametrize(
+    ("prior", "is_valid"),
+    [
+        (collection(feature(NEAR, weight=2), feature(Point(1.01, 46.01), value=7), variogram=CLAY), True),
+        (collection(variogram=None), True),
+        (None, True),
+        ("blooms.geojson", False),
+        (collection(feature(NEAR)), False),
+        (collection(feature(NEAR, weight=-1)), False),
+        (collection(feature(Point(1, 46), weight=3)), False),
+        (collection(feature(LineString([(1, 2), (3, 4)]), weight=1)), False),
+        (collection(variogram=CLAY | {"model": "linear"}), False),
+        (collection(variogram=CLAY | {"nuget": 1}), False),
+    ],
+)
+def test_the_schema_takes_what_the_parser_takes(prior, is_valid):
+    corners = [{"lat": lat, "long": long} for long, lat in SQUARE]
+    document = {"MissionType": "map", "LaunchPoint": corners[0], "BoundingBox": corners, "PriorModel": prior}
+    assert jsonschema.Draft202012Validator(SCHEMA).is_valid(document) is is_valid
+    with nullcontext() if is_valid else pytest.raises(InvalidMission):
+        mission(prior)
