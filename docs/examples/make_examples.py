@@ -13,9 +13,10 @@ import numpy as np
 import shapely
 from shapely import LineString, Point, Polygon
 
-from oxbow.contracts import FloatArray
+from oxbow.contracts import FloatArray, Variogram, VariogramModel
 from oxbow.frame import Frame, Position
 from oxbow.mission import Bloom, Mission, MissionType, write_mission
+from oxbow.prior import PriorFeature, PriorModel, prior_document
 
 FOLDER = Path(__file__).parent
 DECIMALS = 6
@@ -135,10 +136,31 @@ def reservoir() -> bytes:
     return msgspec.json.format(msgspec.json.encode(feature), indent=1) + b"\n"
 
 
+def reservoir_prior() -> bytes:
+    """Where a bloom is expected in the reservoir, inside two contours, and how it varies: a prior model."""
+    frame, rng = Frame(lat=43.6, long=2.75), np.random.default_rng(11)
+    outer, inner = blob(1000.0, 800.0, 380.0, rng, 0.2), blob(1050.0, 820.0, 180.0, rng, 0.2)
+    prior = PriorModel(
+        features=tuple(
+            PriorFeature(
+                geometry=shapely.transform(
+                    shape.simplify(5.0), lambda xy: np.round(frame.to_degrees(xy), DECIMALS)
+                ),
+                weight=weight,
+                value=value,
+            )
+            for shape, weight, value in ((outer, 2.0, 10.0), (inner, 4.0, 30.0))
+        ),
+        variogram=Variogram(model=VariogramModel.EXPONENTIAL, range_m=300.0, sill=80.0, nugget=4.0),
+    )
+    return msgspec.json.format(msgspec.json.encode(prior_document(prior)), indent=1) + b"\n"
+
+
 def main() -> None:
     write_mission(FOLDER / "lake.json", lake())
     write_mission(FOLDER / "meander.json", meander())
     (FOLDER / "reservoir.geojson").write_bytes(reservoir())
+    (FOLDER / "reservoir-prior.geojson").write_bytes(reservoir_prior())
 
 
 if __name__ == "__main__":
