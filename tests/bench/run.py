@@ -11,7 +11,9 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import assignment
 import quality
+import routes
 import stack
 import stages
 from results import Section, keep, show
@@ -20,6 +22,8 @@ from rich.console import Console
 SECTIONS: dict[str, Callable[[], Iterator[Section]]] = {
     "stages": stages.measure,
     "quality": quality.measure,
+    "assignment": assignment.measure,
+    "routes": routes.measure,
     "bus": stack.measure_bus,
     "start": stack.measure_start,
     "connect": stack.measure_connect,

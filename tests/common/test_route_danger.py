@@ -1,0 +1,135 @@
+"""Danger zones: what they cost, how probabilities add up, and how routes avoid them."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from route_scenes import places_in, scene
+from shapely import Polygon, box
+
+from oxbow.errors import InvalidMission
+from oxbow.route import Danger, DangerZone, Per, RouteMethod, make_router
+
+quick = settings(deadline=None, max_examples=15, derandomize=True)
+every_method = pytest.mark.parametrize("method", RouteMethod)
+WATER = box(0, 0, 100, 100)
+MIDDLE = box(40, 30, 60, 70)
+
+
+def per_metre(probability, area=MIDDLE):
+    return DangerZone("shallows", area, probability)
+
+
+def per_crossing(probability, area=MIDDLE):
+    return DangerZone("lane", area, probability, Per.CROSSING)
+
+
+def edges(*places):
+    places = np.array(places, dtype=float)
+    return places[:-1], places[1:]
+
+
+def test_an_edge_costs_as_the_report_says():
+    danger = Danger((per_crossing(0.3),), c_max_m=50.0, a=1.5)
+    starts, ends = edges((0, 50), (100, 50), (100, 0))
+    costs = danger.costs(starts, ends)
+    assert costs[0] == pytest.approx(100 + 50 * math.log(1.5 / (1 - 0.3)), abs=1e-4)
+    assert costs[1] == pytest.approx(50 + 50 * math.log(1.5))
+
+
+def test_probabilities_of_harm_multiply_over_edges():
+    danger = Danger((per_metre(0.01),))
+    starts, ends = edges((0, 50), (45, 50), (52, 52), (100, 50))
+    probability = 1 - np.exp(-danger.hazards(starts, ends))
+    whole = 1 - np.prod(1 - probability)
+    inside_m = shapely.intersection(shapely.LineString([(0, 50), (45, 50), (52, 52), (100, 50)]), MIDDLE).length
+    assert whole == pytest.approx(1 - 0.99**inside_m, abs=1e-6)
+
+
+@quick
+@given(cuts=st.lists(st.floats(0.01, 0.99), max_size=6, unique=True), back=st.booleans())
+def test_danger_does_not_depend_on_how_a_way_is_divided(cuts, back):
+    danger = Danger((per_metre(0.02), per_crossing(0.4), per_crossing(0.1, box(50, 0, 55, 100))))
+    share = np.array([0.0, *sorted(cuts, reverse=back), 1.0] if not back else [1.0, *sorted(cuts)[::-1], 0.0])
+    places = np.column_stack([100 * share, 40 + 20 * share])
+    assert danger.hazards(places[:-1], places[1:]).sum() == pytest.approx(
+        danger.hazards(*edges((0, 40), (100, 60))).sum(), abs=1e-6
+    )
+
+
+def test_each_crossing_counts_once():
+    bay = Polygon([(20, 20), (80, 20), (80, 40), (70, 40), (70, 30), (30, 30), (30, 40), (20, 40)])
+    danger = Danger((per_crossing(0.5, bay),))
+    once, twice = danger.hazards(*edges((50, 0), (50, 60))), danger.hazards(*edges((0, 35), (100, 35)))
+    assert twice == pytest.approx(2 * once)
+    assert 1 - math.exp(-twice.sum()) == pytest.approx(1 - 0.5 * 0.5)
+    start_inside = np.array([[25.0, 35.0]])
+    assert danger.hazards_at(start_inside) == pytest.approx(math.log(2))
+    assert danger.hazards(start_inside, np.array([[0.0, 35.0]])) == 0.0
+
+
+def test_the_outline_of_a_zone_is_outside():
+    danger = Danger((per_metre(0.5), per_crossing(0.5)))
+    assert danger.hazards(*edges((40, 30), (40, 70), (60, 70), (60, 30), (40, 30))).tolist() == [0.0] * 4
+
+
+@every_method
+@quick
+@given(seed=st.integers(0, 10_000))
+def test_without_zones_routes_are_unchanged(seed, method):
+    water = scene(seed)
+    start, goal = places_in(water, 2, seed)
+    plain = make_router(method, water).route(start, goal)
+    other = make_router(method, water, Danger(c_max_m=1e6, a=7.0)).route(start, goal)
+    assert np.array_equal(plain.polyline, other.polyline)
+    assert other.cost == plain.length_m
+    assert other.danger == 0.0
+
+
+@every_method
+@pytest.mark.parametrize("zone", [per_metre(0.05), per_crossing(0.6)])
+def test_a_zone_is_travelled_or_avoided_as_it_is_worth(method, zone):
+    start, goal = (20, 50), (80, 50)
+    careless = make_router(method, WATER, Danger((zone,), c_max_m=0.0)).route(start, goal)
+    careful = make_router(method, WATER, Danger((zone,), c_max_m=1e4)).route(start, goal)
+    inside_m = 20.0 if zone.per is Per.METRE else 1.0
+    if method is RouteMethod.VISIBILITY:
+        assert careless.danger == pytest.approx(1 - (1 - zone.probability) ** inside_m, abs=1e-6)
+        assert careful.length_m == pytest.approx(20 + 2 * math.hypot(20, 20))
+    assert careful.danger == 0.0
+    assert careful.cost == careful.length_m > careless.length_m
+
+
+@every_method
+@quick
+@given(seed=st.integers(0, 10_000))
+def test_distances_are_the_costs_of_the_routes(seed, method):
+    water = scene(seed, obstacles=3)
+    points = places_in(water, 4, seed)
+    danger = Danger((per_metre(0.01), per_crossing(0.2, box(10, 10, 50, 45))), c_max_m=100.0, a=1.1)
+    router = make_router(method, water, danger)
+    distances = router.distances(points)
+    exact = make_router(RouteMethod.VISIBILITY, water).distances(points)
+    assert np.array_equal(distances, distances.T)
+    assert (distances >= exact - 1e-6).all()
+    for i, j in ((0, 1), (1, 3)):
+        route = router.route(points[i], points[j])
+        assert route.cost == pytest.approx(distances[i, j], rel=1e-6)
+        edges_there = len(route.polyline) - 1
+        worth_m = route.length_m + 100.0 * (edges_there * math.log(1.1) - math.log1p(-route.danger))
+        assert route.cost == pytest.approx(worth_m)
+
+
+def test_a_danger_of_1_is_refused_by_name():
+    for probability in (1.0, 1.5, -0.1, math.nan):
+        with pytest.raises(InvalidMission, match=r"shallows: has danger .*expected 0 <= danger < 1"):
+            per_metre(probability)
+    with pytest.raises(InvalidMission, match="lane: is empty"):
+        per_crossing(0.5, Polygon())
+    with pytest.raises(InvalidMission, match=r"a: is 0\.9; expected a finite number, >= 1"):
+        Danger(a=0.9)
+    with pytest.raises(InvalidMission, match="c_max_m: is inf"):
+        Danger(c_max_m=math.inf)
