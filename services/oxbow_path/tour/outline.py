@@ -39,9 +39,9 @@ def enclosed(way: FloatArray, free: Polygon, lane_m: float) -> Polygon:
     lane_m
         Half the width of a lane, and of the joints between parts that only touch.
     """
-    stretches = shapely.get_parts(shapely.union_all([LineString(way)]))
-    if len(stretches) == 0:
+    if (way == way[0]).all():
         return largest(Point(way[0]).buffer(lane_m).intersection(free))
+    stretches = shapely.get_parts(shapely.union_all([LineString(way)]))
     faces = shapely.get_parts(shapely.polygonize(stretches))
     region = shapely.union_all([Polygon(), *faces[_is_odd(faces, way)]])
     twice = stretches[~shapely.covers(region.boundary, stretches)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,9 +19,10 @@ from oxbow_path.legs import ROUNDING_M
 from oxbow_path.remainder import with_remainder
 from oxbow_path.spacing import Budget
 from oxbow_path.task import Task
-from oxbow_path.tour.geodesic import Geodesics, Shore
+from oxbow_path.tour.geodesic import Geodesics, Indices, Shore
 from oxbow_path.tour.local_search import shortened
 from oxbow_path.tour.outline import enclosed
+from oxbow_path.tour.pruning import pruned
 from oxbow_path.tour.pyvrp_solver import is_installed, polished
 from oxbow_path.tour.sites import clustered, low_discrepancy, with_gaps
 from oxbow_path.tour.solver import Solution, Solver
@@ -68,17 +69,36 @@ REACH = 1.5
 
 
 @dataclass(frozen=True)
-class TourTrial:
-    """A path through one number of sites, and what led to it; geometry in the sweep frame.
+class Tour:
+    """A closed tour in the sweep frame.
 
-    `count` is how many clusters were asked for; `sites` are the launch and recovery points' entries, the clusters'
-    centres, and what was added far from all of these. `way` is the tour through them, `solver` what found it.
+    `count` clusters were asked for; the sites are the launch and recovery points' entries, the clusters' centres,
+    and what was added far from all of these. `order` holds those that are visited, `solver` what ordered them.
     """
 
     count: int
-    sites: FloatArray
-    way: LineString
+    pitch_m: float
+    entries: int
+    geodesics: Geodesics
+    order: Indices
     solver: str
+
+    @property
+    def sites(self) -> FloatArray:
+        """The sites in the order of their visits, shape (n, 2)."""
+        return self.geodesics.places[self.order]
+
+    @cached_property
+    def way(self) -> LineString:
+        """The shortest way through all of them, and back to the first."""
+        return LineString(self.geodesics.way(self.order))
+
+
+@dataclass(frozen=True)
+class TourTrial:
+    """A path round a tour."""
+
+    tour: Tour
     trial: Trial
 
     @property
@@ -91,9 +111,9 @@ class TourTrial:
         return self.trial.length_m
 
     @property
-    def pitch_m(self) -> float:
+    def spacing_m(self) -> float:
         """Distance of neighbouring sites, and about that of neighbouring legs."""
-        return self.trial.pattern.spacing_m
+        return self.tour.pitch_m
 
 
 @dataclass(frozen=True)
@@ -126,7 +146,9 @@ def plan_tour(task: Task, *, solver: Solver | None = None) -> TourPlan:
     attempt = _Attempt(
         task.waters, min(2 * SAMPLES * first, MOST_SAMPLES), task.request.seed, solver or _best_solver()
     )
-    trials = _fitted(attempt, first, most, budget)
+    trials = list(_fitted(attempt, first, most, budget))
+    if not any(_is_enough(trial, budget, most) for trial in trials):
+        trials.extend(_shortened(attempt, trials, budget))
     fitting = [trial for trial in trials if budget.fits(trial.length_m)]
     if not fitting:
         shortest_m = min(trial.length_m for trial in trials)
@@ -134,10 +156,20 @@ def plan_tour(task: Task, *, solver: Solver | None = None) -> TourPlan:
             f"is {task.request.length_m:.0f} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
             "Master_length",
         )
-    chosen = max(fitting, key=lambda trial: trial.length_m)
-    if chosen.length_m < budget.enough_m and chosen.count < most:
+    chosen = min(fitting, key=lambda trial: _score(trial, task.waters, budget))
+    if not _is_enough(chosen, budget, most):
         chosen = replace(chosen, trial=with_remainder(chosen.trial, task.waters, budget))
-    return TourPlan(chosen, trials)
+    return TourPlan(chosen, tuple(trials))
+
+
+def _is_enough(trial: TourTrial, budget: Budget, most: int) -> bool:
+    """Whether a path fits the length, and uses it or has as many sites as there may be."""
+    return budget.fits(trial.length_m) and (trial.length_m >= budget.enough_m or trial.tour.count >= most)
+
+
+def _score(trial: TourTrial, waters: Waters, budget: Budget) -> float:
+    """The largest distance to the path, charged for what the path leaves unused of the length."""
+    return float(waters.probe.distances(trial.path).max()) * max(1.0, budget.enough_m / trial.length_m)
 
 
 def _best_solver() -> Solver:
@@ -161,28 +193,29 @@ class _Attempt:
     def _shore(self) -> Shore:
         return Shore(self.waters.free)
 
-    def __call__(self, count: int) -> TourTrial:
-        waters = self.waters
-        pitch_m = math.sqrt(waters.free.area / count) if count else waters.spacing_m
-        sites = self._sites(count, pitch_m)
-        geodesics = self._shore.geodesics(sites)
+    def tour(self, count: int) -> Tour:
+        """A tour of so many clusters; with none, of the entries alone."""
+        pitch_m = math.sqrt(self.waters.free.area / count) if count else self.waters.spacing_m
+        entries = np.unique(shapely.get_coordinates(self.waters.entries), axis=0)
+        geodesics = self._shore.geodesics(self._sites(entries, count, pitch_m))
         solution = self._solution(geodesics, NEAR * pitch_m)
-        way = geodesics.way(solution.order)
-        lane_m = LANE * pitch_m
-        pattern = Pattern(pitch_m, REACH, 0.0)
+        return Tour(count, pitch_m, len(entries), geodesics, solution.order, solution.solver)
+
+    def path(self, tour: Tour) -> TourTrial:
+        """The path round a tour."""
+        waters, lane_m = self.waters, LANE * tour.pitch_m
+        pattern = Pattern(tour.pitch_m, REACH, 0.0)
         walk = simply_connected(
-            enclosed(way, waters.free, lane_m),
+            enclosed(shapely.get_coordinates(tour.way), waters.free, lane_m),
             waters.free,
             waters.probe,
             cut_width_m=2 * lane_m,
             reach_m=pattern.reach_m,
         )
         reached = Walk(_reaching_entries(walk.region, waters, lane_m), walk.cuts, walk.enclosed)
-        trial = finished(waters, pattern, Circuit((), ()), reached)
-        return TourTrial(count, sites, LineString(way), solution.solver, trial)
+        return TourTrial(tour, finished(waters, pattern, Circuit((), ()), reached))
 
-    def _sites(self, count: int, pitch_m: float) -> FloatArray:
-        entries = np.unique(shapely.get_coordinates(self.waters.entries), axis=0)
+    def _sites(self, entries: FloatArray, count: int, pitch_m: float) -> FloatArray:
         if count == 0:
             return entries
         centres = clustered(self._samples, count, self.waters.free)
@@ -207,19 +240,14 @@ def _reaching_entries(region: Polygon, waters: Waters, half_width_m: float) -> P
 
 
 def _fitted(attempt: _Attempt, first: int, most: int, budget: Budget) -> tuple[TourTrial, ...]:
-    """Trials of different counts, until one uses the length well or no other count is left to try.
-
-    Should none fit, the last has no sites but the entries.
-    """
+    """Trials of different counts, until one uses the length well or no better count is found."""
     trials: dict[int, TourTrial] = {}
     count = first
     while count not in trials and len(trials) < TURNS:
-        trials[count] = trial = attempt(count)
-        if budget.fits(trial.length_m) and (trial.length_m >= budget.enough_m or count == most):
+        trials[count] = trial = attempt.path(attempt.tour(count))
+        if _is_enough(trial, budget, most):
             break
         count = min(most, _next_count(trials, (budget.enough_m + budget.most_m) / 2))
-    if 0 not in trials and not any(budget.fits(trial.length_m) for trial in trials.values()):
-        trials[0] = attempt(0)
     return tuple(trials.values())
 
 
@@ -234,3 +262,30 @@ def _next_count(trials: Mapping[int, TourTrial], target_m: float) -> int:
         return round((low + share * (high - low)) ** 2)
     length_m, root = (too_short or too_long)[-1 if too_short else 0]
     return round((root * target_m / length_m) ** 2)
+
+
+def _shortened(attempt: _Attempt, trials: Sequence[TourTrial], budget: Budget) -> Iterator[TourTrial]:
+    """Trials of the shortest tour that is too long, less some of its sites, until one uses the length well.
+
+    Where all are too long, the last visits nothing but the entries.
+    """
+    too_long = [trial for trial in trials if not budget.fits(trial.length_m)]
+    if not too_long:
+        return
+    whole = min(too_long, key=lambda trial: trial.length_m)
+    target_m = (budget.enough_m + budget.most_m) / 2
+    tour_m, fits = whole.tour.way.length + target_m - whole.length_m, len(too_long) < len(trials)
+    tried = {len(whole.tour.order)}
+    for _ in range(TURNS):
+        order = pruned(whole.tour.order, whole.tour.geodesics, kept=whole.tour.entries, length_m=tour_m)
+        if len(order) in tried:
+            break
+        tried.add(len(order))
+        trial = attempt.path(replace(whole.tour, order=order))
+        yield trial
+        fits = fits or budget.fits(trial.length_m)
+        if budget.enough_m <= trial.length_m <= budget.most_m:
+            break
+        tour_m = max(0.0, tour_m + target_m - trial.length_m)
+    if not fits:
+        yield attempt.path(attempt.tour(0))
