@@ -8,7 +8,7 @@ exchanges.
 from __future__ import annotations
 
 import enum
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +23,10 @@ from oxbow_assignment.ordering import EXACT_MOST, best_path, exact_path
 from oxbow_assignment.problem import IntArray, Problem
 from oxbow_assignment.pseudo_coordinates import PseudoCoordinates, pseudo_coordinates
 
-__all__ = ["ClusterMethod", "Clustered", "Clustering", "assign", "mended"]
+__all__ = ["ClusterMethod", "Clustered", "Clustering", "assign", "cluster_paths", "mended"]
+
+STARTS = 3
+"""Starts of k-means: the second and third halve the distance to the joint optimiser, more do little."""
 
 
 class ClusterMethod(enum.StrEnum):
@@ -47,8 +50,8 @@ class Clustering:
         targets are made.
     radius_m
         The longest mean route from a target to its cluster's targets, for `ClusterMethod.RADIUS` and only for it.
-    seed
-        Where k-means starts.
+    seed, starts
+        Where k-means starts, and how often it starts anew: the best assignment counts.
 
     Raises
     ------
@@ -60,6 +63,7 @@ class Clustering:
     k: int | None = None
     radius_m: float | None = None
     seed: int = 0
+    starts: int = STARTS
 
     def __post_init__(self) -> None:
         by_radius = self.method is ClusterMethod.RADIUS
@@ -71,6 +75,8 @@ class Clustering:
             )
         if self.k is not None and (by_radius or self.k < 1):
             raise InvalidMission(f"is {self.k}; expected 1 or more, and none with a radius", where="k")
+        if self.starts < 1:
+            raise InvalidMission(f"is {self.starts}; expected 1 or more", where="starts")
 
 
 @dataclass(frozen=True)
@@ -103,18 +109,33 @@ def assign(problem: Problem, clustering: Clustering | None = None) -> Clustered:
     """
     clustering = clustering or Clustering()
     targets = np.flatnonzero(problem.can_visit.any(axis=0))
-    vehicles = range(len(problem.vehicles))
     if not len(targets):
-        idle = [problem.path(vehicle, ()) for vehicle in vehicles]
+        idle = [problem.path(vehicle, ()) for vehicle in range(len(problem.vehicles))]
         return Clustered(assignment_of(problem, idle), targets, None, np.empty(0, dtype=np.intp), 0.0)
     coordinates = pseudo_coordinates(problem.finite[np.ix_(targets, targets)])
-    clusters = _clusters(problem, coordinates, clustering)
+    found = (
+        _by_clusters(problem, targets, coordinates, clusters)
+        for clusters in _clusterings(problem, coordinates, clustering)
+    )
+    return min(found, key=lambda clustered: clustered.assignment.rank)
+
+
+def _by_clusters(
+    problem: Problem, targets: IntArray, coordinates: PseudoCoordinates, clusters: Clusters
+) -> Clustered:
     owners = match(problem, clusters, targets)
-    own = owners[clusters.labels]
-    paths = [best_path(problem.finite, problem.path(vehicle, targets[own == vehicle])) for vehicle in vehicles]
-    fitting = [trimmed(problem, vehicle, path) for vehicle, path in enumerate(paths)]
-    assignment = assignment_of(problem, mended(problem, fitting, [0] * len(paths)))
+    paths = cluster_paths(problem, targets, clusters, owners)
+    assignment = assignment_of(problem, mended(problem, paths, [0] * len(paths)))
     return Clustered(assignment, targets, clusters, owners, coordinates.stress)
+
+
+def cluster_paths(problem: Problem, targets: IntArray, clusters: Clusters, owners: IntArray) -> list[IntArray]:
+    """Each vehicle's path through its own clusters, as far as its range allows: all that the report does."""
+    own = owners[clusters.labels]
+    return [
+        trimmed(problem, vehicle, best_path(problem.finite, problem.path(vehicle, targets[own == vehicle])))
+        for vehicle in range(len(problem.vehicles))
+    ]
 
 
 def mended(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -> list[IntArray]:
@@ -142,10 +163,12 @@ def _exact(problem: Problem, path: IntArray, held: int) -> IntArray:
     return np.concatenate([path[:held], exact_path(problem.finite, path[held:])])
 
 
-def _clusters(problem: Problem, coordinates: PseudoCoordinates, clustering: Clustering) -> Clusters:
+def _clusterings(problem: Problem, coordinates: PseudoCoordinates, clustering: Clustering) -> Iterator[Clusters]:
     if clustering.radius_m is not None:
-        return cluster_by_radius(coordinates, clustering.radius_m)
+        yield cluster_by_radius(coordinates, clustering.radius_m)
+        return
     able = int(problem.can_visit.any(axis=1).sum())
     k = min(clustering.k or able, len(coordinates.places))
     cluster = fuzzy_c_means if clustering.method is ClusterMethod.FUZZY_C_MEANS else k_means
-    return cluster(coordinates, k, seed=clustering.seed)
+    for start in range(clustering.starts):
+        yield cluster(coordinates, k, seed=clustering.seed + start)

@@ -80,6 +80,11 @@ class Assignment:
         """The objective."""
         return self.makespan_s if self.objective is Objective.MAKESPAN else self.total_duration_s
 
+    @property
+    def rank(self) -> tuple[float, float]:
+        """Less is better: value first, then cost."""
+        return -self.value, self.cost_s
+
 
 def tour_length(problem: Problem, path: IntArray) -> float:
     """Metres of one vehicle's path; 0 without targets."""

@@ -56,7 +56,7 @@ class Solution:
         """Whichever serves more value, or the same at less cost."""
         if self.joint is None:
             return self.clustered.assignment
-        return min(self.clustered.assignment, self.joint, key=lambda found: (-found.value, found.cost_s))
+        return min(self.clustered.assignment, self.joint, key=lambda found: found.rank)
 
 
 def solve(

@@ -7,7 +7,6 @@ recovery last. An order of targets is exact up to `EXACT_MOST` targets and a loc
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -58,10 +57,11 @@ def exact_path(distances: FloatArray, path: IntArray) -> IntArray:
     start, targets, end = path[0], path[1:-1], path[-1]
     n = len(targets)
     between = distances[np.ix_(targets, targets)]
+    sizes = np.bitwise_count(np.arange(1 << n))
     lengths = np.full((1 << n, n), np.inf)
     lengths[1 << np.arange(n), np.arange(n)] = distances[start, targets]
     for size in range(1, n):
-        sets = np.array([sum(1 << i for i in chosen) for chosen in combinations(range(n), size)])
+        sets = np.flatnonzero(sizes == size)
         longer = (lengths[sets, :, None] + between).min(axis=1)
         rows, added = np.nonzero((sets[:, None] >> np.arange(n)) & 1 == 0)
         lengths[sets[rows] | (1 << added), added] = longer[rows, added]

@@ -229,6 +229,7 @@ def test_a_vehicle_that_cannot_be_is_named(fields, says):
         (lambda: Clustering(method=ClusterMethod.RADIUS), "radius_m: is None"),
         (lambda: Clustering(radius_m=3.0), "radius_m: is 3.0"),
         (lambda: Clustering(k=0), "k: is 0"),
+        (lambda: Clustering(starts=0), "starts: is 0"),
         (lambda: Clustering(method=ClusterMethod.RADIUS, radius_m=1.0, k=2), "k: is 2"),
     ],
 )

@@ -11,13 +11,14 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import assignment
 import quality
 import routes
 import stack
 import stages
 from results import Section, keep, show
 from rich.console import Console
+
+import assignment
 
 SECTIONS: dict[str, Callable[[], Iterator[Section]]] = {
     "stages": stages.measure,
