@@ -8,7 +8,7 @@ order again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,10 +38,11 @@ def exchanged(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) 
     near = _near(problem)
     while True:
         layout = Layout.of(problem, paths, held)
-        made = dict(_made([kind(layout, near) for kind in (_relocations, _swaps, _tails)], layout))
-        if not made:
+        relocations = (_relocations(layout, near, length) for length in range(1, SEGMENT + 1))
+        changed = _best_apart([*relocations, _swaps(layout, near), _tails(layout, near)], layout)
+        if not changed:
             return paths
-        for vehicle, path in made.items():
+        for vehicle, path in changed.items():
             paths[vehicle] = in_order(problem, path, held[vehicle])
 
 
@@ -60,51 +61,31 @@ def _near(problem: Problem) -> IntArray:
 
 @dataclass(frozen=True)
 class _Moves:
-    """Moves of one kind: what each gains, the two tours it changes, and the two paths that it makes."""
+    """Moves of one kind: what each gains, the two tours it changes, and the new path of each of these."""
 
     gains: FloatArray
     one: IntArray
     other: IntArray
-    paths: Callable[[int], tuple[IntArray, IntArray]]
+    paths: Callable[[int], dict[int, IntArray]]
 
 
-def _made(kinds: Sequence[_Moves], layout: Layout) -> Iterator[tuple[int, IntArray]]:
+def _best_apart(kinds: Sequence[_Moves], layout: Layout) -> dict[int, IntArray]:
     """The paths that the best moves make, each on tours that no better one has touched."""
     least = LEAST_GAIN * float(layout.problem.strain(layout.lengths_m, np.arange(len(layout.lengths_m))).sum())
     gains = np.concatenate([moves.gains for moves in kinds])
     origin = np.concatenate([np.full(len(moves.gains), kind) for kind, moves in enumerate(kinds)])
     index = np.concatenate([np.arange(len(moves.gains)) for moves in kinds])
-    untouched = np.ones(len(layout.lengths_m), dtype=bool)
     worth = np.flatnonzero(gains > least)
+    changed: dict[int, IntArray] = {}
     for best in worth[np.argsort(-gains[worth], kind="stable")].tolist():
         moves, chosen = kinds[origin[best]], int(index[best])
-        tours = [int(moves.one[chosen]), int(moves.other[chosen])]
-        if untouched[tours].all():
-            untouched[tours] = False
-            yield from zip(tours, moves.paths(chosen), strict=True)
+        if int(moves.one[chosen]) not in changed and int(moves.other[chosen]) not in changed:
+            changed |= moves.paths(chosen)
+    return changed
 
 
-def _relocations(layout: Layout, near: IntArray) -> _Moves:
-    """Move a segment of up to `SEGMENT` targets, either way round, next to a near target or to a tour's front."""
-    parts = [_relocations_of(layout, near, length) for length in range(1, SEGMENT + 1)]
-    gains, segment, edge, turned = (np.concatenate(column) for column in zip(*parts, strict=True))
-    size = np.repeat(np.arange(1, SEGMENT + 1), [len(part[0]) for part in parts])
-
-    def paths(index: int) -> tuple[IntArray, IntArray]:
-        at, length, onto = int(segment[index]), int(size[index]), int(edge[index])
-        moved = layout.rows[at : at + length][:: -1 if turned[index] else 1]
-        giver, taker = layout.tour[at], layout.tour[onto]
-        inner = at - layout.firsts[giver]
-        given = np.delete(layout.paths[giver], slice(inner, inner + length))
-        return given, np.insert(layout.paths[taker], onto - layout.firsts[taker] + 1, moved)
-
-    return _Moves(gains, layout.tour[segment], layout.tour[edge], paths)
-
-
-def _relocations_of(
-    layout: Layout, near: IntArray, length: int
-) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
-    """Of all moves of segments of one length: gain, places of segment and edge, and whether it is turned."""
+def _relocations(layout: Layout, near: IntArray, length: int) -> _Moves:
+    """Move a segment of `length` targets, either way round, next to a near target or to a tour's front."""
     rows, metres = layout.rows, layout.problem.finite
     at = np.flatnonzero(layout.is_free[: len(rows) - length + 1] & layout.is_free[length - 1 :])
     at = at[layout.tour[at] == layout.tour[at + length - 1]]
@@ -127,7 +108,17 @@ def _relocations_of(
     turned_m = metres[before, last] + metres[first, after]
     taken_m = layout.lengths_m[taker] - layout.edge_m[edges] + inside_m + np.minimum(kept_m, turned_m)
     allowed = np.logical_and.reduce([layout.problem.has_role[taker, rows[at + i]] for i in range(length)])
-    return layout.gains(giver, given_m, taker, taken_m, allowed), at, edges, (turned_m < kept_m).astype(np.intp)
+
+    def paths(index: int) -> dict[int, IntArray]:
+        one, other, place = int(giver[index]), int(taker[index]), int(at[index])
+        moved = rows[place : place + length][:: -1 if turned_m[index] < kept_m[index] else 1]
+        inner = place - layout.firsts[one]
+        return {
+            one: np.delete(layout.paths[one], slice(inner, inner + length)),
+            other: np.insert(layout.paths[other], edges[index] - layout.firsts[other] + 1, moved),
+        }
+
+    return _Moves(layout.gains(giver, given_m, taker, taken_m, allowed), giver, taker, paths)
 
 
 def _swaps(layout: Layout, near: IntArray) -> _Moves:
@@ -145,12 +136,13 @@ def _swaps(layout: Layout, near: IntArray) -> _Moves:
         changed: FloatArray = metres[left, target] + metres[target, right] - layout.edge_m[here - 1]
         return layout.lengths_m[layout.tour[here]] + changed - layout.edge_m[here]
 
-    def paths(index: int) -> tuple[IntArray, IntArray]:
-        here, there = int(at[index]), int(with_[index])
-        first, second = layout.paths[one[index]].copy(), layout.paths[other[index]].copy()
-        first[here - layout.firsts[one[index]]] = rows[there]
-        second[there - layout.firsts[other[index]]] = rows[here]
-        return first, second
+    def paths(index: int) -> dict[int, IntArray]:
+        changed = {}
+        for here, there in ((at[index], with_[index]), (with_[index], at[index])):
+            tour = int(layout.tour[here])
+            changed[tour] = layout.paths[tour].copy()
+            changed[tour][here - layout.firsts[tour]] = rows[there]
+        return changed
 
     allowed = layout.problem.has_role[one, rows[with_]] & layout.problem.has_role[other, rows[at]]
     gains = layout.gains(one, length(at, rows[with_]), other, length(with_, rows[at]), allowed)
@@ -163,38 +155,33 @@ def _tails(layout: Layout, near: IntArray) -> _Moves:
     J.-Y. Potvin and J.-M. Rousseau (1995). Each vehicle still ends at its own recovery. Vehicles must have the
     same role for every target.
     """
-    rows, metres, along_m = layout.rows, layout.problem.finite, layout.along_m
-    cut = np.flatnonzero(layout.is_open & (rows < near.shape[0]))
-    join = layout.place[near[rows[cut]]]
+    cut = np.flatnonzero(layout.is_open & (layout.rows < len(near)))
+    join = layout.place[near[layout.rows[cut]]]
     cut, join = np.repeat(cut, join.shape[1]), join.ravel()
     keep = (join >= 0) & layout.is_open[join - 1] & (layout.tour[join] != layout.tour[cut])
     cut, join = cut[keep], join[keep]
     one, other = layout.tour[cut], layout.tour[join]
-    one_end, other_end = layout.lasts[one], layout.lasts[other]
-    one_m = (
-        along_m[cut]
-        + metres[rows[cut], rows[join]]
-        + (along_m[other_end - 1] - along_m[join])
-        + metres[rows[other_end - 1], rows[one_end]]
-    )
-    has_tail = cut + 1 < one_end
-    tail_m = (
-        metres[rows[join - 1], rows[cut + 1]]
-        + (along_m[one_end - 1] - along_m[cut + 1])
-        + metres[rows[one_end - 1], rows[other_end]]
-    )
-    is_empty = join - 1 == layout.firsts[other]
-    headed_m = np.where(is_empty, 0.0, along_m[join - 1] + metres[rows[join - 1], rows[other_end]])
-    other_m = np.where(has_tail, along_m[join - 1] + tail_m, headed_m)
-    has_role = layout.problem.has_role
-    alike = (has_role[:, None] == has_role[None, :]).all(axis=2)
+    one_m, other_m = _spliced_m(layout, cut, join), _spliced_m(layout, join - 1, cut + 1)
 
-    def paths(index: int) -> tuple[IntArray, IntArray]:
-        first, second = layout.paths[one[index]], layout.paths[other[index]]
-        i, j = cut[index] + 1 - layout.firsts[one[index]], join[index] - layout.firsts[other[index]]
-        return (
+    def paths(index: int) -> dict[int, IntArray]:
+        tours = int(one[index]), int(other[index])
+        first, second = (layout.paths[tour] for tour in tours)
+        i, j = cut[index] + 1 - layout.firsts[tours[0]], join[index] - layout.firsts[tours[1]]
+        spliced = (
             np.concatenate([first[:i], second[j:-1], first[-1:]]),
             np.concatenate([second[:j], first[i:-1], second[-1:]]),
         )
+        return dict(zip(tours, spliced, strict=True))
 
+    has_role = layout.problem.has_role
+    alike = (has_role[:, None] == has_role[None, :]).all(axis=2)
     return _Moves(layout.gains(one, one_m, other, other_m, alike[one, other]), one, other, paths)
+
+
+def _spliced_m(layout: Layout, head: IntArray, tail: IntArray) -> FloatArray:
+    """Metres of paths up to the places `head`, then on from the places `tail` of other paths to their own ends."""
+    metres, rows, along_m = layout.problem.finite, layout.rows, layout.along_m
+    recovery, last = layout.lasts[layout.tour[head]], layout.lasts[layout.tour[tail]] - 1
+    has_tail = tail <= last
+    over_m = metres[rows[head], rows[tail]] + along_m[last] - along_m[tail] + metres[rows[last], rows[recovery]]
+    return np.where(has_tail, along_m[head] + over_m, along_m[head] + layout.joint_m(head, recovery))

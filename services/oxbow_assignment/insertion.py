@@ -9,7 +9,7 @@ import numpy as np
 
 from oxbow.contracts import FloatArray
 from oxbow_assignment.assignment import tour_length
-from oxbow_assignment.problem import IntArray, Problem
+from oxbow_assignment.problem import ROUNDING, IntArray, Problem
 
 __all__ = ["inserted", "traded", "trimmed"]
 
@@ -121,6 +121,7 @@ def _offers(problem: Problem, vehicle: int, path: IntArray, held: int, pool: Int
     places = added.argmin(axis=1)
     lengths = length_m + added[np.arange(len(pool)), places]
     strain = problem.strain(np.append(lengths, length_m), np.full(len(pool) + 1, vehicle))
-    fits = problem.has_role[vehicle, pool] & (lengths <= problem.lengths_m[vehicle])
+    limit_m = problem.lengths_m[vehicle] * (1.0 - ROUNDING if len(path) > 2 else 1.0)
+    fits = problem.has_role[vehicle, pool] & (lengths <= limit_m)
     costs = np.where(fits, (strain[:-1] - strain[-1]) / problem.values[pool], np.inf)
     return _Offers(costs=costs, places=held + 1 + places)

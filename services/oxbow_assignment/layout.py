@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from oxbow.contracts import FloatArray
-from oxbow_assignment.problem import BoolArray, IntArray, Problem
+from oxbow_assignment.problem import ROUNDING, BoolArray, IntArray, Problem
 
 __all__ = ["Layout"]
 
@@ -87,7 +87,8 @@ class Layout:
     ) -> FloatArray:
         """What the objective gains if two tours get new lengths; -inf where a tour would be too long."""
         problem = self.problem
-        fits = (one_m <= problem.lengths_m[one]) & (other_m <= problem.lengths_m[other])
+        limits = problem.lengths_m * (1.0 - ROUNDING)
+        fits = (one_m <= limits[one]) & (other_m <= limits[other])
         before = problem.strain(self.lengths_m[one], one) + problem.strain(self.lengths_m[other], other)
         after = problem.strain(np.maximum(one_m, 0.0), one) + problem.strain(np.maximum(other_m, 0.0), other)
         return np.where(possible & fits, before - after, -np.inf)

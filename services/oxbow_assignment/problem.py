@@ -14,10 +14,13 @@ from oxbow.contracts import FloatArray
 from oxbow.errors import InvalidMission
 from oxbow_assignment.fleet import Role, Vehicle
 
-__all__ = ["BoolArray", "IntArray", "Objective", "Problem", "require_distances"]
+__all__ = ["ROUNDING", "BoolArray", "IntArray", "Objective", "Problem", "require_distances"]
 
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.intp]
+
+ROUNDING = 1e-12
+"""Lengths that are the same sum in another order differ by less than this share."""
 
 SYMMETRY = 1e-6
 """Least relative difference between there and back that is not rounding."""

@@ -192,6 +192,14 @@ def test_a_target_for_which_no_range_is_left_is_reported():
     assert "lengthen the tour of 'boat' by 800 m, and 200 m are left" in unserved.reason
 
 
+@pytest.mark.parametrize("objective", list(Objective))
+def test_a_target_at_the_very_end_of_the_range_is_visited(objective):
+    fleet = [vehicle((0.1, 0.2), name="here", length_m=1_000.0), vehicle((2_000.0, 0.2), name="there")]
+    scene = problem([(500.1, 0.2), (0.1, 500.2)], [fleet[0]], objective=objective)
+    assert len(assign(scene).assignment.tours[0].targets) == 1
+    assert not assign(problem([(500.1, 0.2), (0.1, 500.2)], fleet, objective=objective)).assignment.unserved
+
+
 def test_vehicles_without_a_route_between_them_each_serve_their_side():
     places = np.random.default_rng(0).uniform(0.0, 100.0, (12, 2))
     scene = problem(places, [vehicle(name="here"), vehicle(name="there")])
