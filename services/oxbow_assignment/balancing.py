@@ -16,11 +16,11 @@ import networkx as nx
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_array, csr_array, diags_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.sparse.linalg import spsolve
 
 from oxbow.contracts import FloatArray
-from oxbow.mesh import Indices, Mesh, propagate
+from oxbow.mesh import Indices, Mesh
 
 __all__ = ["balanced_shares", "border_lengths_m", "imbalance"]
 
@@ -140,11 +140,10 @@ class _Giver:
 
     def part(self, area_m2: float, tolerance_m2: float) -> Mask:
         """The part of about this area to give, shape (m,); it hangs together with the taker, and the rest does."""
-        own = np.zeros(len(self.mesh), dtype=bool)
-        own[self.triangles] = True
-        depth = propagate(self.mesh, self.triangles[self.outlets > 0], own).depth[self.triangles]
-        farthest = int(np.argmax(depth))
-        best, least_error = np.zeros(len(depth), dtype=bool), area_m2
+        ways = self.mesh.graph[self.triangles][:, self.triangles]
+        from_taker_m = dijkstra(ways, indices=np.flatnonzero(self.outlets), min_only=True)
+        farthest = int(np.argmax(from_taker_m))
+        best, least_error = np.zeros(len(from_taker_m), dtype=bool), area_m2
         for _ in range(TRIES):
             below, above = self._bracket(farthest, area_m2)
             for given in (below, above):
@@ -154,7 +153,7 @@ class _Giver:
             if least_error <= tolerance_m2:
                 break
             # A dead end changes hands as a whole: the potential is to vary in it.
-            farthest = int(np.argmax(np.where(above & ~below, depth, -1)))
+            farthest = int(np.argmax(np.where(above & ~below, from_taker_m, -1.0)))
         moved = np.zeros(len(self.mesh), dtype=bool)
         moved[self.triangles[best]] = True
         return moved

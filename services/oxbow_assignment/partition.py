@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
@@ -93,7 +93,9 @@ def wavefront_partition(mesh: Mesh, starts: Sequence[Place], capacities: FloatAr
         There are no vehicles or more than triangles, or a capacity is not positive.
     """
     capacities = _checked(mesh, starts, capacities)
-    return _from_seeds(mesh, _spread(mesh, starts), capacities)
+    seeds = _spread(mesh, starts)
+    waves = propagate(mesh, seeds)
+    return Partition(mesh, waves.source, waves.depth, tuple(seeds.tolist()), capacities)
 
 
 def balanced_partition(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None = None) -> Partition:
@@ -120,22 +122,21 @@ def balanced_partition(mesh: Mesh, starts: Sequence[Place], capacities: FloatArr
         No division of the mesh balanced the shares.
     """
     capacities = _checked(mesh, starts, capacities)
-    rounds = list(_rounds(mesh, _spread(mesh, starts), capacities))
-    even = [partition for partition in rounds if partition.imbalance <= BALANCE]
-    if even:
-        return min(even, key=lambda partition: partition.border_m)
-    best = min(rounds, key=lambda partition: partition.imbalance)
+    due_m2 = _due_m2(mesh, capacities)
+    share = min(_rounds(mesh, _spread(mesh, starts), due_m2), key=partial(_badness, mesh, due_m2=due_m2))
     for _ in range(SUBDIVISIONS):
-        mesh, share = best.mesh.subdivided(), np.repeat(best.share, 4)
-        share = balanced_shares(mesh, share, _due_m2(mesh, capacities))
-        best = _partition(mesh, share, _middles(mesh, share, len(capacities)), capacities)
-        if best.imbalance <= BALANCE:
-            return best
-    raise Infeasible(
-        f"{len(starts)} shares of {mesh.areas_m2.sum():.0f} m2 are up to {best.imbalance:.0%} from what is due;"
-        f" expected at most {BALANCE:.0%}: choose a finer mesh",
-        where="Vehicles",
-    )
+        if _imbalance(mesh, share, due_m2) <= BALANCE:
+            break
+        mesh, share = mesh.subdivided(), np.repeat(share, 4)
+        share = balanced_shares(mesh, share, due_m2)
+    if (found := _imbalance(mesh, share, due_m2)) > BALANCE:
+        raise Infeasible(
+            f"are {len(starts)}, whose shares are up to {found:.0%} from what is due; expected at most"
+            f" {BALANCE:.0%}: fewer vehicles, or capacities less far apart",
+            where="Vehicles",
+        )
+    seeds = _middles(mesh, share, len(starts))
+    return Partition(mesh, share, _depth(mesh, share, seeds), tuple(seeds.tolist()), capacities)
 
 
 def _checked(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None) -> FloatArray:
@@ -154,27 +155,32 @@ def _due_m2(mesh: Mesh, capacities: FloatArray) -> FloatArray:
     return np.asarray(mesh.areas_m2.sum() * capacities / capacities.sum())
 
 
-def _rounds(mesh: Mesh, seeds: Indices, capacities: FloatArray) -> Iterator[Partition]:
+def _rounds(mesh: Mesh, seeds: Indices, due_m2: FloatArray) -> Iterator[Indices]:
     """Balanced shares from the given seeds, and from seeds that move to their middles."""
-    due_m2 = _due_m2(mesh, capacities)
     for _ in range(ROUNDS):
         share = balanced_shares(mesh, propagate(mesh, seeds).source, due_m2)
-        seeds = _middles(mesh, share, len(capacities))
-        yield _partition(mesh, share, seeds, capacities)
+        yield share
+        seeds, before = _middles(mesh, share, len(due_m2)), seeds
+        if (seeds == before).all():
+            break
 
 
-def _from_seeds(mesh: Mesh, seeds: Indices, capacities: FloatArray) -> Partition:
-    waves = propagate(mesh, seeds)
-    return Partition(mesh, waves.source, waves.depth, tuple(seeds.tolist()), capacities)
+def _imbalance(mesh: Mesh, share: Indices, due_m2: FloatArray) -> float:
+    return imbalance(np.bincount(share, mesh.areas_m2, minlength=len(due_m2)).astype(float), due_m2)
 
 
-def _partition(mesh: Mesh, share: Indices, seeds: Indices, capacities: FloatArray) -> Partition:
-    """A partition with the depth of each share's own wavefront."""
+def _badness(mesh: Mesh, share: Indices, *, due_m2: FloatArray) -> tuple[float, float]:
+    """Balance first, where it is not good enough; then the length of all borders."""
+    return max(_imbalance(mesh, share, due_m2), BALANCE), float(border_lengths_m(mesh, share, len(due_m2)).sum())
+
+
+def _depth(mesh: Mesh, share: Indices, seeds: Indices) -> Indices:
+    """Steps from the seed of every triangle's share, within the share."""
     depth = np.zeros(len(mesh), dtype=np.intp)
     for vehicle, seed in enumerate(seeds.tolist()):
         own = share == vehicle
         depth[own] = propagate(mesh, [seed], own).depth[own]
-    return Partition(mesh, share, depth, tuple(seeds.tolist()), capacities)
+    return depth
 
 
 def _spread(mesh: Mesh, starts: Sequence[Place]) -> Indices:

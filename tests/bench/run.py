@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import meshes
 import quality
 import routes
 import stack
@@ -25,6 +26,7 @@ SECTIONS: dict[str, Callable[[], Iterator[Section]]] = {
     "quality": quality.measure,
     "assignment": assignment.measure,
     "routes": routes.measure,
+    "meshes": meshes.measure,
     "bus": stack.measure_bus,
     "start": stack.measure_start,
     "connect": stack.measure_connect,
