@@ -86,7 +86,15 @@ def require_area(message: Message, *fields: str) -> None:
 class Method(enum.StrEnum):
     """A way to generate a path; the names are the report's (Rendas and Li 2016, section 1.1)."""
 
+    SPACE_FILLING_CURVE = "SpaceFillingCurve"
     TRANSECT = "Transect"
+
+
+class Draw(enum.StrEnum):
+    """How the inputs of the space-filling curve's network are drawn (Rendas and Li 2016, section 1.2.1.4)."""
+
+    LOW_DISCREPANCY = "low-discrepancy"
+    CONVEX_COMBINATION = "convex-combination"
 
 
 # --------------------------------------------------------------------------- contour
@@ -231,9 +239,10 @@ class PathRequest(Message, frozen=True, kw_only=True):
 
     `weighted_areas` do not overlap, and may reach beyond the water. `time_limit_s` is what may be spent on
     improving the path; without it the work is fixed, and the same request gives the same path everywhere.
+    `smooth` asks for rounded corners. `draw` matters to the space-filling curve alone.
     """
 
-    method: Method = Method.TRANSECT
+    method: Method = Method.SPACE_FILLING_CURVE
     space: FreeSpace
     decomposition: Decomposition
     launch: Place
@@ -243,6 +252,8 @@ class PathRequest(Message, frozen=True, kw_only=True):
     seed: int = 0
     weighted_areas: tuple[WeightedArea, ...] = ()
     time_limit_s: float | None = None
+    smooth: bool = False
+    draw: Draw = Draw.LOW_DISCREPANCY
 
     def __post_init__(self) -> None:
         require_finite(self, "length_m", "time_limit_s", above=0.0)

@@ -16,7 +16,7 @@ class PlanOptions(Message, frozen=True, kw_only=True):
     the plan depends on the machine.
     """
 
-    method: Method = Method.TRANSECT
+    method: Method = Method.SPACE_FILLING_CURVE
     seed: int = 0
     heading_rad: float | None = None
     tolerance_m: float | None = None

@@ -61,7 +61,7 @@ def oxbow(
 @app.command()
 def plan(
     file: MissionFile,
-    method: Annotated[str, typer.Option(help="How to generate the path.")] = "Transect",
+    method: Annotated[str, typer.Option(help="How to generate the path.")] = "SpaceFillingCurve",
     prior: Annotated[
         Path | None,
         typer.Option(

@@ -9,25 +9,23 @@ from functools import partial
 
 import numpy as np
 import shapely
-from shapely import Point
 
-from oxbow.contracts import FreeSpace, PathRequest
+from oxbow.contracts import SpacingStep
 from oxbow.errors import Infeasible
-from oxbow.sweep import to_sweep
-from oxbow_path.legs import Passable, access
-from oxbow_path.probe import Probe
+from oxbow_path.refinement import Polyline, refined
 from oxbow_path.remainder import with_remainder
-from oxbow_path.routes import Routes
+from oxbow_path.show import show_transects
 from oxbow_path.spacing import Budget, fitted
+from oxbow_path.task import Display, MethodPlan, Task
 from oxbow_path.transect import Pattern, Trial, Waters, try_pattern
 
-__all__ = ["ACCEPTED", "TransectPlan", "finest_spacing_m", "plan_transects"]
+__all__ = ["TransectPlan", "plan_transects", "transects"]
 
-LENGTH_USED = (0.97, 0.999)
-"""Shares of the longest length that a path should use."""
+ENOUGH = 0.97
+"""Share of the longest length that a path should use at least."""
 
-ACCEPTED = 0.95
-"""Share of the longest length below which a plan says why it does not use more (report: 5 %)."""
+UPRIGHT = 0.02
+"""Slope at most, of what counts as a transect."""
 
 FIRST_SPACING = 1.15
 """The first spacing tried, as a multiple of area / length: turns and ways back cost about as much."""
@@ -37,14 +35,8 @@ PHASES = (0.25, 0.75)
 REACH_FOR_SPACING = 0.6
 """The fitting spacing falls about as the reach to this power."""
 
-FINEST = 200
-"""At most so many spacings make up the root of the water's area."""
-
 MANY_POINTS = 80_000
 """With more probe points than these, one pattern is fitted and not several."""
-
-PROBE_PITCH = 0.35
-"""Pitch of the probe grid, in nominal spacings."""
 
 
 @dataclass(frozen=True)
@@ -56,39 +48,53 @@ class TransectPlan:
     trials: tuple[Trial, ...]
 
 
-def plan_transects(request: PathRequest) -> TransectPlan:
-    """Plan a Transect path.
+def transects(task: Task, display: Display) -> MethodPlan:
+    """Plan a path of parallel transects, and refine it: transects slide and turn a little, all else moves freely.
 
     Raises
     ------
     Infeasible
         Even the shortest way from launch to recovery is longer than the vehicle can go.
     """
-    least_spacing_m = max(request.min_spacing_m, finest_spacing_m(request.space))
-    nominal_m = max(request.space.free.area / request.length_m, least_spacing_m)
-    waters = _waters(request, nominal_m)
-    enough, most = (share * request.length_m for share in LENGTH_USED)
-    budget = Budget(most, enough, least_spacing_m)
-    trials = tuple(_trials(waters, budget, FIRST_SPACING * nominal_m))
+    plan = plan_transects(task)
+    show_transects(plan, display)
+    chosen, spacing_m = plan.chosen, plan.chosen.pattern.spacing_m
+    path = refined(
+        _polyline(chosen, task),
+        task.waters.free,
+        task.samples,
+        length_m=max(chosen.length_m, task.useful_length_m),
+        spacing_m=task.spacing_m,
+        stop=task.stop,
+        watch=display.refinement,
+    )
+    steps = tuple(SpacingStep(spacing_m=trial.pattern.spacing_m, length_m=trial.length_m) for trial in plan.trials)
+    return MethodPlan(path, spacing_m, chosen.pattern.reach_m, steps)
+
+
+def plan_transects(task: Task) -> TransectPlan:
+    """The best of several patterns, each fitted to the length."""
+    waters = task.waters
+    budget = Budget(task.length_m, ENOUGH * task.length_m, task.least_spacing_m)
+    trials = tuple(_trials(waters, budget, FIRST_SPACING * task.spacing_m))
     fitting = [trial for trial in trials if budget.fits(trial.length_m)]
     if not fitting:
         shortest = min(trial.length_m for trial in trials)
         raise Infeasible(
-            f"is {request.length_m:.0f} m; the shortest path from launch to recovery is {shortest:.0f} m",
+            f"is {task.request.length_m:.0f} m; the shortest path from launch to recovery is {shortest:.0f} m",
             "Master_length",
         )
     chosen = min(fitting, key=lambda trial: _score(trial, waters, budget))
-    if chosen.pattern.spacing_m > least_spacing_m:
+    if chosen.pattern.spacing_m > task.least_spacing_m:
         chosen = with_remainder(chosen, waters, budget)
     return TransectPlan(waters, chosen, trials)
 
 
-def finest_spacing_m(space: FreeSpace) -> float:
-    """The least spacing that is planned: finer sampling of small waters takes long, and serves no one.
-
-    Rendas and Li 2016, section 1.2.1.2, find that the spacing needs a least value for small sites.
-    """
-    return math.sqrt(space.free.area) / FINEST
+def _polyline(trial: Trial, task: Task) -> Polyline:
+    """The path, its transects rigid: they stand upright in the sweep frame."""
+    across, along = np.abs(np.diff(shapely.get_coordinates(trial.path), axis=0)).T
+    rigid = (across < UPRIGHT * along) & (along > trial.pattern.spacing_m)
+    return Polyline.of(trial.path, task.waters.passable.free_and_rounding, rigid)
 
 
 def _trials(waters: Waters, budget: Budget, first_spacing_m: float) -> Iterator[Trial]:
@@ -122,35 +128,3 @@ def _score(trial: Trial, waters: Waters, budget: Budget) -> float:
     distance = waters.probe.distances(trial.path)
     unused = max(0.0, budget.enough_m / trial.length_m - 1.0)
     return float(distance.max() + np.quantile(distance, 0.95)) * (1.0 + unused)
-
-
-def _require_connected(request: PathRequest) -> None:
-    """A point in water that is not connected to the free space cannot be reached at the safety distance."""
-    for where, place in (("LaunchPoint", request.launch), ("RecoveryPoint", request.recovery)):
-        for part in request.space.dropped:
-            if part.outline.covers(Point(place)):
-                raise Infeasible(
-                    f"lies in {part.area_m2:.0f} m2 of water that is left out ({part.reason}); move it into the"
-                    " largest part, or choose a smaller Safety",
-                    where,
-                )
-
-
-def _waters(request: PathRequest, spacing_m: float) -> Waters:
-    """Turn the request into the sweep frame, and prepare what all trials share."""
-    _require_connected(request)
-    turn = partial(to_sweep, heading_rad=request.decomposition.heading_rad)
-    free, water = (shapely.transform(polygon, turn) for polygon in (request.space.free, request.space.water))
-    shapely.prepare([free, water])
-    shore = Routes(water, spacing_m)
-    (launch, recovery) = turn(np.array([request.launch, request.recovery]))
-    return Waters(
-        spacing_m=spacing_m,
-        cells=request.decomposition.cells,
-        free=free,
-        passable=Passable(free),
-        probe=Probe.over(free, PROBE_PITCH * spacing_m),
-        routes=Routes(free, PROBE_PITCH * spacing_m),
-        launch=access(tuple(launch), free, shore, where="LaunchPoint"),
-        recovery=access(tuple(recovery), free, shore, where="RecoveryPoint"),
-    )

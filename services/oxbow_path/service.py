@@ -2,42 +2,56 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
 import shapely
 from shapely import LineString
 
-from oxbow.contracts import PathPlan, PathRequest, SpacingStep
+from oxbow.contracts import Method, PathPlan, PathRequest
 from oxbow.recording import Show
-from oxbow.sweep import from_sweep
 from oxbow_path.conformance import require_conforming
 from oxbow_path.dropped import dropped_parts
 from oxbow_path.legs import Access
-from oxbow_path.planner import ACCEPTED, TransectPlan, finest_spacing_m, plan_transects
-from oxbow_path.show import show_plan
+from oxbow_path.planner import transects
+from oxbow_path.ring import space_filling_curve
+from oxbow_path.task import Display, MethodPlan, PathMethod, Stop, Task, finest_spacing_m
 
-__all__ = ["handle"]
+__all__ = ["METHODS", "handle"]
+
+METHODS: dict[Method, PathMethod] = {
+    Method.SPACE_FILLING_CURVE: space_filling_curve,
+    Method.TRANSECT: transects,
+}
+
+ACCEPTED = 0.95
+"""Share of the longest length below which a plan says why it does not use more (report: 5 %)."""
 
 
 def handle(request: PathRequest, show: Show) -> PathPlan:
     """Plan a path by the requested method, check it, and show how it came about."""
-    plan = plan_transects(request)
-    back = partial(from_sweep, heading_rad=request.decomposition.heading_rad)
-    show_plan(plan, back, show)
-    path = _from_launch_to_recovery(shapely.transform(plan.chosen.path, back), request)
+    task = Task.of(request, _stop(request.time_limit_s))
+    display = Display(show, request.decomposition.heading_rad)
+    plan = METHODS[request.method](task, display)
+    display.lines("path", [plan.path])
+    path = _from_launch_to_recovery(shapely.transform(plan.path, display.back), request)
     require_conforming(path, request)
-    dropped = dropped_parts(path, request.space.free, plan.chosen.pattern.reach_m)
     return PathPlan(
         path=path,
-        spacing_m=plan.chosen.pattern.spacing_m,
-        steps=tuple(
-            SpacingStep(spacing_m=trial.pattern.spacing_m, length_m=trial.length_m) for trial in plan.trials
-        ),
-        dropped=dropped,
-        warnings=_warnings(plan, request),
+        spacing_m=plan.spacing_m,
+        steps=plan.steps,
+        dropped=dropped_parts(path, request.space.free, plan.reach_m),
+        warnings=(*_leg_warnings(task), *_length_warnings(plan, request)),
     )
+
+
+def _stop(limit_s: float | None) -> Stop:
+    """Tells whether the time is up, from now on; without a limit it never is."""
+    if limit_s is None:
+        return lambda: False
+    end_s = time.monotonic() + limit_s
+    return lambda: time.monotonic() >= end_s
 
 
 def _from_launch_to_recovery(path: LineString, request: PathRequest) -> LineString:
@@ -47,12 +61,8 @@ def _from_launch_to_recovery(path: LineString, request: PathRequest) -> LineStri
     return LineString(points)
 
 
-def _warnings(plan: TransectPlan, request: PathRequest) -> tuple[str, ...]:
-    legs = {"LaunchPoint": plan.waters.launch, "RecoveryPoint": plan.waters.recovery}
-    return (*_leg_warnings(legs), *_length_warnings(plan, request))
-
-
-def _leg_warnings(legs: dict[str, Access]) -> Iterator[str]:
+def _leg_warnings(task: Task) -> Iterator[str]:
+    legs: dict[str, Access] = {"LaunchPoint": task.waters.launch, "RecoveryPoint": task.waters.recovery}
     for where, leg in legs.items():
         if leg.ashore:
             yield f"{where} lies ashore: its leg of {leg.line.length:.0f} m begins over land"
@@ -63,12 +73,12 @@ def _leg_warnings(legs: dict[str, Access]) -> Iterator[str]:
             )
 
 
-def _length_warnings(plan: TransectPlan, request: PathRequest) -> Iterator[str]:
-    share = plan.chosen.length_m / request.length_m
+def _length_warnings(plan: MethodPlan, request: PathRequest) -> Iterator[str]:
+    share = plan.path.length / request.length_m
     if share < ACCEPTED:
-        if plan.chosen.pattern.spacing_m <= request.min_spacing_m:
+        if plan.spacing_m <= request.min_spacing_m:
             reason = f"Minimal_spatial_rate keeps the spacing at {request.min_spacing_m:g} m"
-        elif plan.chosen.pattern.spacing_m <= finest_spacing_m(request.space):
+        elif plan.spacing_m <= finest_spacing_m(request.space):
             reason = f"the water is small, and no spacing below {finest_spacing_m(request.space):.2g} m is planned"
         else:
             reason = "no spacing between those tried fits better"

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from oxbow.contracts import ContourRequest, DecomposeRequest, PathRequest, Place
+from oxbow.contracts import ContourRequest, DecomposeRequest, Method, PathRequest, Place
 from oxbow.recording import discard
 from oxbow_contour.service import handle as contour
 from oxbow_decomposition.service import handle as decompose
@@ -39,6 +39,7 @@ def request(
     recovery: Place | None = None,
     min_spacing_m: float = 0.0,
     heading_rad: float | None = None,
+    method: Method = Method.TRANSECT,
 ) -> PathRequest:
     """A request for some water: `spacings` is the length, and `safety` the distance, over the root of the area."""
     scale_m = math.sqrt(water.area)
@@ -51,6 +52,7 @@ def request(
     )
     cells = decompose(DecomposeRequest(free=space.free, spacing_m=spacing_m, heading_rad=heading_rad), discard)
     return PathRequest(
+        method=method,
         space=space,
         decomposition=cells,
         launch=launch,

@@ -17,10 +17,11 @@ from oxbow_path.circuit import plan_circuit
 from oxbow_path.conformance import require_conforming
 from oxbow_path.gaps import reach_gaps
 from oxbow_path.legs import Passable, access, joined
-from oxbow_path.planner import _waters, plan_transects
+from oxbow_path.planner import plan_transects
 from oxbow_path.probe import Probe, covered
 from oxbow_path.routes import Routes, taut
 from oxbow_path.spacing import Budget, fitted
+from oxbow_path.task import Task, prepared_waters
 from oxbow_path.transect import Pattern, Trial, try_pattern
 from oxbow_path.transects import place_transects
 from oxbow_path.walk import Brush, Walk, dilated, simply_connected
@@ -105,7 +106,7 @@ def test_no_hole_remains_and_little_is_lost(holes):
 @given(seed=st.integers(0, 10_000))
 def test_after_the_gaps_no_water_is_out_of_reach(seed):
     asked = request(lake(seed), spacings=12)
-    waters, spacing = _waters(asked, 1000.0 / 6), 200.0
+    waters, spacing = prepared_waters(asked, 1000.0 / 6), 200.0
     transects = place_transects(waters.cells, 2 * spacing, phase=0.25, min_length_m=2 * spacing)
     circuit = plan_circuit(waters.cells, transects, trim_m=60.0, inset_m=160.0)
     brush = Brush(waters.free, spacing / 2, 60.0)
@@ -248,7 +249,7 @@ def test_the_spacing_loop_keeps_the_least_spacing():
 
 def test_the_remainder_is_spent_and_never_makes_a_gap_deeper():
     asked = request(lake(5), spacings=14)
-    plan = plan_transects(asked)
+    plan = plan_transects(Task.of(asked, stop=lambda: False))
     fitting = [trial for trial in plan.trials if trial.length_m <= 0.999 * asked.length_m]
     same = next(trial for trial in fitting if trial.pattern == plan.chosen.pattern)
     assert same.length_m <= plan.chosen.length_m <= asked.length_m
@@ -257,7 +258,7 @@ def test_the_remainder_is_spent_and_never_makes_a_gap_deeper():
 
 
 def test_a_pattern_is_built_the_same_whatever_was_built_before():
-    waters = _waters(request(lake(6)), 70.0)
+    waters = prepared_waters(request(lake(6)), 70.0)
     first = try_pattern(waters, Pattern(90.0, 1.5, 0.25))
     try_pattern(waters, Pattern(140.0, 1.3, 0.75))
     assert try_pattern(waters, Pattern(90.0, 1.5, 0.25)).path == first.path

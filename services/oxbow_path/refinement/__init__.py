@@ -1,0 +1,8 @@
+"""Refinement: waypoints moved against the worst gaps, within the length; shared by all path methods."""
+
+from oxbow_path.refinement.guard import Guard
+from oxbow_path.refinement.polyline import Polyline
+from oxbow_path.refinement.refine import RefinementStep, Stop, refined
+from oxbow_path.refinement.samples import Samples, weights_at
+
+__all__ = ["Guard", "Polyline", "RefinementStep", "Samples", "Stop", "refined", "weights_at"]

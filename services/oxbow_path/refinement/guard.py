@@ -1,0 +1,136 @@
+"""Moves that keep a path inside and simple: what would break either is not moved, or not as far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely import Polygon, STRtree
+from shapely.geometry.base import BaseGeometry
+
+from oxbow.contracts import FloatArray
+from oxbow_path.refinement.polyline import BoolArray, Indices, Polyline
+
+__all__ = ["Guard"]
+
+ROUNDING_M = 1e-6
+"""How far the free space may be left: what rounding moves."""
+
+CLEARANCE = 0.02
+"""Least distance between stretches of the path that are no neighbours, in spacings, unless they began nearer."""
+
+NEIGHBOURS = 2
+"""Segments so near along the path may come nearer than the clearance: a bend joins them."""
+
+HALVINGS = 3
+"""How often a node's step is halved before the node stays."""
+
+LOCAL_ROUNDS = 8
+"""After so many rounds the neighbours of what still is at fault stay too."""
+
+ROUNDS = 14
+
+FOLD = -0.9999
+"""Cosine of the turn at which a node folds its two segments onto each other."""
+
+
+@dataclass(frozen=True)
+class Guard:
+    """Keeps a path inside the free space, apart from itself.
+
+    Every state that it lets through is one that it has checked as a whole, or the one before: so a path that was
+    inside and simple stays both, whatever moves are asked for.
+    """
+
+    free: BaseGeometry
+    clearance_m: float
+
+    @classmethod
+    def of(cls, free: Polygon, path: Polyline, spacing_m: float) -> Guard:
+        """Guard a path; one whose stretches began nearer than the usual clearance may stay half as near."""
+        grown = free.buffer(ROUNDING_M)
+        shapely.prepare(grown)
+        segments = path.segments
+        pairs = STRtree(segments).query(segments, predicate="dwithin", distance=CLEARANCE * spacing_m)
+        first, second = _beyond(path, pairs[:, ~path.legs[pairs].any(axis=0)], NEIGHBOURS)
+        near_m = shapely.distance(segments[first], segments[second])
+        return cls(grown, min([CLEARANCE * spacing_m, *(near_m / 2)]))
+
+    def faults(self, path: Polyline, suspect: BoolArray | None = None) -> BoolArray:
+        """Which segments (n - 1,) leave the free space, or meet, fold onto or come too near another.
+
+        Where only some segments are suspect, the others are known to be at fault with none but those.
+        """
+        segments = path.segments
+        asked = np.arange(len(segments)) if suspect is None else np.flatnonzero(suspect)
+        fault = np.zeros(len(segments), dtype=bool)
+        fault[asked] = ~shapely.covers(self.free, segments[asked]) & ~path.legs[asked]
+        index, other = STRtree(segments).query(segments[asked], predicate="dwithin", distance=self.clearance_m)
+        near = _beyond(path, np.stack([asked[index], other]), 1)
+        # Neighbours but one, and legs, which begin side by side, may come near, but not meet.
+        excused = (_steps_between(path, near) <= NEIGHBOURS) | path.legs[near].any(axis=0)
+        excused &= ~shapely.intersects(segments[near[0]], segments[near[1]])
+        fault[near[:, ~excused]] = True
+        folded = _folded(path)
+        fault[:-1] |= folded
+        fault[1:] |= folded
+        return fault
+
+    def moved(self, path: Polyline, target: FloatArray) -> Polyline:
+        """The path with its nodes as far on the way to `target` (n, 2) as keeps it inside and simple."""
+        step = np.where(path.pinned[:, None], 0.0, target - path.nodes)
+        share = np.ones(len(path.nodes))
+        suspect: BoolArray | None = None
+        for turn in range(ROUNDS):
+            moved = path.moved(path.nodes + share[:, None] * step)
+            fault = self.faults(moved, suspect)
+            if not fault.any():
+                return moved
+            blamed = _ends(fault)
+            if turn >= LOCAL_ROUNDS:
+                blamed[1:] |= blamed[:-1]
+                blamed[:-1] |= blamed[1:]
+            share[blamed] = share[blamed] / 2 if turn < HALVINGS else 0.0
+            suspect = blamed[:-1] | blamed[1:]
+        return path
+
+    def thinned(self, path: Polyline, drop: BoolArray) -> Polyline:
+        """The path without the nodes to drop, but for those whose loss would put it at fault."""
+        for _ in range(ROUNDS):
+            thinner = path.without(drop)
+            fault = self.faults(thinner)
+            if not fault.any():
+                return thinner
+            kept = np.flatnonzero(~drop)
+            restored = np.zeros(len(drop) + 1, dtype=int)
+            np.add.at(restored, kept[:-1][fault], 1)
+            np.add.at(restored, kept[1:][fault], -1)
+            drop = drop & (np.cumsum(restored)[:-1] == 0)
+            if not drop.any():
+                break
+        return path
+
+
+def _steps_between(path: Polyline, pairs: Indices) -> Indices:
+    """How many segments on along the path the second of each pair (2, m) is."""
+    count = len(path.legs)
+    steps = np.abs(pairs[1] - pairs[0])
+    return np.asarray(np.minimum(steps, count - steps) if path.is_closed else steps)
+
+
+def _beyond(path: Polyline, pairs: Indices, steps: int) -> Indices:
+    """The pairs that are more than so many segments apart along the path."""
+    return np.asarray(pairs[:, _steps_between(path, pairs) > steps])
+
+
+def _ends(segment: BoolArray) -> BoolArray:
+    """The nodes (n,) of the chosen segments (n - 1,)."""
+    return np.asarray(np.append(segment, False) | np.append(False, segment))
+
+
+def _folded(path: Polyline) -> BoolArray:
+    """Which inner nodes (n - 2,) fold the path back onto itself."""
+    edge = np.diff(path.nodes, axis=0)
+    product = path.lengths_m[:-1] * path.lengths_m[1:]
+    return np.asarray((edge[:-1] * edge[1:]).sum(axis=1) < FOLD * np.maximum(product, np.finfo(float).tiny))

@@ -1,0 +1,116 @@
+"""The path as nodes that move, but for those that must stay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from shapely import LineString
+from shapely.geometry.base import BaseGeometry
+
+from oxbow.contracts import FloatArray
+
+__all__ = ["BoolArray", "Indices", "Polyline"]
+
+BoolArray = npt.NDArray[np.bool_]
+Indices = npt.NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Polyline:
+    """A path from launch to recovery as nodes.
+
+    Attributes
+    ----------
+    nodes
+        Positions, shape (n, 2).
+    pinned
+        Which nodes stay where they are (n,): the two ends, and those of legs outside the free space.
+    legs
+        Which segments are such legs (n - 1,).
+    rigid
+        Which segments stay one straight line (n - 1,): they slide and turn, and are never divided.
+    """
+
+    nodes: FloatArray
+    pinned: BoolArray
+    legs: BoolArray
+    rigid: BoolArray
+
+    @classmethod
+    def of(cls, path: LineString, free: BaseGeometry, rigid: BoolArray | None = None) -> Polyline:
+        """A path's own vertices as nodes; `free` is the (prepared) free space."""
+        nodes = shapely.get_coordinates(path)
+        legs = ~shapely.covers(free, _segments(nodes))
+        pinned = np.zeros(len(nodes), dtype=bool)
+        pinned[[0, -1]] = True
+        pinned[:-1] |= legs
+        pinned[1:] |= legs
+        return cls(nodes, pinned, legs, np.zeros(len(legs), dtype=bool) if rigid is None else rigid)
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it ends where it starts."""
+        return bool((self.nodes[0] == self.nodes[-1]).all())
+
+    @cached_property
+    def lengths_m(self) -> FloatArray:
+        """The length of each segment, shape (n - 1,)."""
+        return np.asarray(np.hypot(*np.diff(self.nodes, axis=0).T))
+
+    @property
+    def length_m(self) -> float:
+        """The length of all."""
+        return float(self.lengths_m.sum())
+
+    @property
+    def line(self) -> LineString:
+        """The path."""
+        return LineString(self.nodes)
+
+    @property
+    def segments(self) -> npt.NDArray[np.object_]:
+        """Each segment as a line, shape (n - 1,)."""
+        return _segments(self.nodes)
+
+    def moved(self, nodes: FloatArray) -> Polyline:
+        """The same nodes elsewhere."""
+        return Polyline(nodes, self.pinned, self.legs, self.rigid)
+
+    def divided(self, most_m: float) -> Polyline:
+        """With nodes added so that no segment is longer than `most_m`, but for legs and rigid ones."""
+        pieces = np.maximum(1, np.ceil(self.lengths_m / most_m).astype(int))
+        pieces[self.legs | self.rigid] = 1
+        segment = np.repeat(np.arange(len(pieces)), pieces)
+        piece = np.arange(len(segment)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+        share = (piece / pieces[segment])[:, None]
+        nodes = self.nodes[segment] + share * np.diff(self.nodes, axis=0)[segment]
+        return Polyline(
+            np.vstack([nodes, self.nodes[-1:]]),
+            np.append(self.pinned[segment] & (piece == 0), self.pinned[-1]),
+            self.legs[segment],
+            self.rigid[segment],
+        )
+
+    def without(self, drop: BoolArray) -> Polyline:
+        """Without some nodes, none of them pinned or an end of a rigid segment."""
+        kept = np.flatnonzero(~drop)
+        return Polyline(self.nodes[kept], self.pinned[kept], self.legs[kept[:-1]], self.rigid[kept[:-1]])
+
+    def crowded(self, least_m: float) -> BoolArray:
+        """Nodes (n,) that could go: the segments on their two sides together are shorter than `least_m`.
+
+        No two neighbours are among them.
+        """
+        crowded = np.zeros(len(self.nodes), dtype=bool)
+        both = self.lengths_m[:-1] + self.lengths_m[1:] < least_m
+        crowded[1:-1] = both & ~self.pinned[1:-1] & ~self.rigid[:-1] & ~self.rigid[1:]
+        run = np.arange(len(crowded)) - np.maximum.accumulate(np.where(crowded, 0, np.arange(len(crowded))))
+        return np.asarray(crowded & (run % 2 == 1))
+
+
+def _segments(nodes: FloatArray) -> npt.NDArray[np.object_]:
+    return np.asarray(shapely.linestrings(np.stack([nodes[:-1], nodes[1:]], axis=1)))

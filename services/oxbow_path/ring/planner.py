@@ -1,0 +1,98 @@
+"""The method SpaceFillingCurve (Rendas and Li 2016, section 1.2.1.4)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from oxbow.contracts import SpacingStep
+from oxbow.errors import Infeasible
+from oxbow_path.refinement import Guard, Polyline, refined, weights_at
+from oxbow_path.ring.draws import drawn_places
+from oxbow_path.ring.kohonen import Epoch, Schedule, organised
+from oxbow_path.task import SHOWN_EVERY, Display, MethodPlan, Task
+from oxbow_path.transect import Pattern, Trial, try_pattern
+
+__all__ = ["space_filling_curve"]
+
+START_SPACINGS = (2.0, 3.0, 5.0, 8.0)
+"""The first walk's spacing, in nominal ones: the first that fits. About half the length is left to the ring,
+which folds it into the water without a preferred direction.
+"""
+
+REACH = 1.5
+PHASE = 0.25
+"""Of the first walk: see `Pattern`."""
+
+EPOCHS = 30
+"""Updates of the ring."""
+
+REACH_NAMED = 2.0
+"""Water farther from the path than so many half spacings is named as dropped."""
+
+
+def space_filling_curve(task: Task, display: Display) -> MethodPlan:
+    """Plan a path as a Kohonen ring.
+
+    The steps are those of the report: a circuit over the cells, low-discrepancy sequences in each, a ring
+    that is updated with them until it has spread, a number of nodes that follows the length. Two things are added:
+    every update is guarded, so that the path stays simple and inside through islands, straits and narrow arms,
+    and the refinement ends it, since the ring knows nothing of its worst gap, nor quite how long it is.
+
+    Raises
+    ------
+    Infeasible
+        Even the shortest way from launch to recovery is longer than the vehicle can go.
+    """
+    start = _start(task)
+    display.lines("circuit", (*start.circuit.transects, *start.circuit.links))
+    display.lines("start", [start.path])
+    ring = Polyline.of(start.path, task.waters.passable.free_and_rounding)
+    steps = [SpacingStep(spacing_m=start.pattern.spacing_m, length_m=start.length_m)]
+    for number, epoch in enumerate(_epochs(ring, task)):
+        ring = epoch.ring
+        figures = {"nodes": len(ring.nodes), "length_m": ring.length_m, "neighbourhood": epoch.width}
+        display.figures("ring", figures, step=number)
+        if number % SHOWN_EVERY == 0:
+            display.lines("ring", [ring.line], step=number, labels=(f"epoch {number}",))
+    path = refined(
+        ring,
+        task.waters.free,
+        task.samples,
+        length_m=task.useful_length_m,
+        spacing_m=task.spacing_m,
+        stop=task.stop,
+        watch=display.refinement,
+    )
+    if path.length > task.length_m:
+        path = start.path
+    steps.append(SpacingStep(spacing_m=task.spacing_m, length_m=path.length))
+    return MethodPlan(path, task.spacing_m, REACH_NAMED * task.spacing_m / 2, tuple(steps))
+
+
+def _start(task: Task) -> Trial:
+    """The walk over the circuit of the cells, as coarse as it must be to fit; at last without transects."""
+    x0, y0, x1, y1 = task.waters.free.bounds
+    for spacing_m in (*(factor * task.spacing_m for factor in START_SPACINGS), 2 * math.hypot(x1 - x0, y1 - y0)):
+        trial = try_pattern(task.waters, Pattern(spacing_m, REACH, PHASE))
+        if trial.length_m <= task.length_m:
+            return trial
+    raise Infeasible(
+        f"is {task.request.length_m:.0f} m; the shortest path from launch to recovery is {trial.length_m:.0f} m",
+        "Master_length",
+    )
+
+
+def _epochs(ring: Polyline, task: Task) -> Iterator[Epoch]:
+    request = task.request
+    draws = drawn_places(task.waters.cells, len(task.samples), seed=request.seed, draw=request.draw)
+    return organised(
+        ring,
+        draws,
+        weights_at(draws, task.areas) ** 2,
+        Guard.of(task.waters.free, ring, task.spacing_m),
+        length_m=task.useful_length_m,
+        spacing_m=task.spacing_m,
+        schedule=Schedule(EPOCHS),
+        stop=task.stop,
+    )

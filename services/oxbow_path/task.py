@@ -1,0 +1,210 @@
+"""What every path method is given, and what it gives back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Protocol
+
+import numpy as np
+import shapely
+from shapely import LineString, Point
+from shapely.geometry.base import BaseGeometry
+
+from oxbow.contracts import FloatArray, FreeSpace, PathRequest, SpacingStep, WeightedArea
+from oxbow.errors import Infeasible
+from oxbow.recording import Layer, LayerKind, Show
+from oxbow.sweep import from_sweep, to_sweep
+from oxbow_path.legs import Passable, access
+from oxbow_path.probe import Probe
+from oxbow_path.refinement import RefinementStep, Samples
+from oxbow_path.routes import Routes
+from oxbow_path.transect import Waters
+
+__all__ = ["Display", "MethodPlan", "PathMethod", "Stop", "Task", "finest_spacing_m", "prepared_waters"]
+
+Stop = Callable[[], bool]
+"""Asked now and then whether time is up."""
+
+STAGE = "path"
+
+LENGTH_USED = 0.999
+"""Share of the longest length that a path may use: what is left covers the rounding of written positions."""
+
+FINEST = 200
+"""At most so many spacings make up the root of the water's area."""
+
+PROBE_PITCH = 0.35
+"""Pitch of the probe grid, in nominal spacings."""
+
+SAMPLE_PITCH = 0.215
+"""Pitch of the samples, in nominal spacings: 25 a square of one spacing."""
+
+SHOWN_EVERY = 10
+"""The path of every so manieth step of an improvement is shown."""
+
+MOST_SAMPLES = 250_000
+"""Of more samples than about these, the pitch is widened."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A request made ready; geometry in the sweep frame.
+
+    Attributes
+    ----------
+    request
+        What is asked.
+    waters
+        Where the path may run, and how launch and recovery points are reached.
+    length_m
+        The longest path to plan.
+    least_spacing_m
+        Parallel legs need not stand closer.
+    stop
+        Whether time is up.
+    """
+
+    request: PathRequest
+    waters: Waters
+    length_m: float
+    least_spacing_m: float
+    stop: Stop
+
+    @classmethod
+    def of(cls, request: PathRequest, stop: Stop) -> Task:
+        """Turn a request into the sweep frame, and prepare what all methods share.
+
+        Raises
+        ------
+        Infeasible
+            The launch or the recovery point lies in water that is not connected to the free space.
+        """
+        _require_connected(request)
+        least_spacing_m = max(request.min_spacing_m, finest_spacing_m(request.space))
+        nominal_m = max(request.space.free.area / request.length_m, least_spacing_m)
+        return cls(request, prepared_waters(request, nominal_m), LENGTH_USED * request.length_m, least_spacing_m, stop)
+
+    @property
+    def spacing_m(self) -> float:
+        """The nominal spacing: area / length, or the least that is wanted."""
+        return self.waters.spacing_m
+
+    @property
+    def useful_length_m(self) -> float:
+        """The length that is worth travelling: what the least spacing asks for, or the longest there may be."""
+        return min(self.length_m, self.waters.free.area / self.spacing_m)
+
+    @cached_property
+    def areas(self) -> tuple[WeightedArea, ...]:
+        """Where sampling is to be denser, or less dense."""
+        turn = partial(to_sweep, heading_rad=self.request.decomposition.heading_rad)
+        return tuple(
+            WeightedArea(area=shapely.transform(entry.area, turn), weight=entry.weight)
+            for entry in self.request.weighted_areas
+        )
+
+    @cached_property
+    def samples(self) -> Samples:
+        """The places that the path is to come near to."""
+        least_m = math.sqrt(self.waters.free.area / MOST_SAMPLES)
+        return Samples.over(self.waters.free, max(SAMPLE_PITCH * self.spacing_m, least_m), self.areas)
+
+
+@dataclass(frozen=True)
+class MethodPlan:
+    """A method's path from launch to recovery, in the sweep frame, and how it came about.
+
+    Attributes
+    ----------
+    path
+        Simple, and inside the free space but for its legs.
+    spacing_m
+        The spacing of its parallel legs, or about that of neighbouring ones.
+    reach_m
+        Water farther from the path than this is named as dropped.
+    steps
+        The spacings tried, and the lengths that they gave.
+    """
+
+    path: LineString
+    spacing_m: float
+    reach_m: float
+    steps: tuple[SpacingStep, ...]
+
+
+class PathMethod(Protocol):
+    """A way to generate a path."""
+
+    def __call__(self, task: Task, display: Display, /) -> MethodPlan: ...
+
+
+@dataclass(frozen=True)
+class Display:
+    """Shows what a method makes in the sweep frame, turned back into the planar frame."""
+
+    show: Show
+    heading_rad: float
+
+    def lines(
+        self, name: str, lines: Sequence[BaseGeometry], *, step: int = 0, labels: tuple[str, ...] = ()
+    ) -> None:
+        """Show geometry of the sweep frame."""
+        turned = shapely.transform(np.asarray(lines, dtype=object), self.back) if len(lines) else ()
+        self.show(Layer(stage=STAGE, name=name, step=step, geometries=tuple(turned), labels=labels))
+
+    def figures(self, name: str, figures: dict[str, float], *, step: int = 0) -> None:
+        """Show figures of one step."""
+        self.show(Layer(stage=STAGE, name=name, kind=LayerKind.SCALARS, step=step, scalars=figures))
+
+    def refinement(self, number: int, step: RefinementStep) -> None:
+        """Show where a refinement stands: its figures at every step, the path at some."""
+        figures = {"length_m": step.length_m, "largest_distance_m": step.largest_m, "p95_distance_m": step.p95_m}
+        self.figures("refinement", figures, step=number)
+        if number % SHOWN_EVERY == 0:
+            self.lines("refined", [step.path], step=number, labels=(f"step {number}",))
+
+    def back(self, points: FloatArray) -> FloatArray:
+        """From the sweep frame into the planar one."""
+        return from_sweep(points, heading_rad=self.heading_rad)
+
+
+def finest_spacing_m(space: FreeSpace) -> float:
+    """The least spacing that is planned: finer sampling of small waters takes long, and serves no one.
+
+    Rendas and Li 2016, section 1.2.1.2, find that the spacing needs a least value for small sites.
+    """
+    return math.sqrt(space.free.area) / FINEST
+
+
+def _require_connected(request: PathRequest) -> None:
+    """A point in water that is not connected to the free space cannot be reached at the safety distance."""
+    for where, place in (("LaunchPoint", request.launch), ("RecoveryPoint", request.recovery)):
+        for part in request.space.dropped:
+            if part.outline.covers(Point(place)):
+                raise Infeasible(
+                    f"lies in {part.area_m2:.0f} m2 of water that is left out ({part.reason}); move it into the"
+                    " largest part, or choose a smaller Safety",
+                    where,
+                )
+
+
+def prepared_waters(request: PathRequest, spacing_m: float) -> Waters:
+    """The waters of a request, in the sweep frame, for paths of about a given spacing."""
+    turn = partial(to_sweep, heading_rad=request.decomposition.heading_rad)
+    free, water = (shapely.transform(polygon, turn) for polygon in (request.space.free, request.space.water))
+    shapely.prepare([free, water])
+    shore = Routes(water, spacing_m)
+    (launch, recovery) = turn(np.array([request.launch, request.recovery]))
+    return Waters(
+        spacing_m=spacing_m,
+        cells=request.decomposition.cells,
+        free=free,
+        passable=Passable(free),
+        probe=Probe.over(free, PROBE_PITCH * spacing_m),
+        routes=Routes(free, PROBE_PITCH * spacing_m),
+        launch=access(tuple(launch), free, shore, where="LaunchPoint"),
+        recovery=access(tuple(recovery), free, shore, where="RecoveryPoint"),
+    )
