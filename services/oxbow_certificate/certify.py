@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import shapely
 
@@ -46,46 +47,71 @@ def judge(request: CertifyRequest) -> Judgement:
     Infeasible
         The zones or the safety distance leave no water to judge on.
     """
-    path = request.path
     space = JudgedSpace.of(request)
-    distance = PathDistance(path)
+    distance = PathDistance(request.path)
     cover = cover_radius(space.judged, distance)
     spread = distance_spread(space.judged, distance)
-    least_m = least_radius(space.judged.area, path.length)
-    spacing_m = 2.0 * least_m
-    ends = (request.launch, request.recovery)
-    crossings = count_crossings(path)
-    positions = discrepancy(space.judged, path, spacing_m, 2.0 * space.detail_m)
-    meeting_legs = about_ends(space, ends, max(2.0 * request.safety_m, spacing_m))
-    variogram = request.variogram
-    kriging = kriging_variance(path, spread.places, variogram, least_m) if variogram else None
+    least_m = least_radius(space.judged.area, request.path.length)
     certificate = Certificate(
-        length_m=path.length,
-        duration_s=path.length / request.speed_mps,
-        waypoints=int(shapely.get_num_coordinates(path)),
-        is_simple=crossings == 0,
-        crossings=crossings,
-        outside_m=outside_length(path, space),
-        unsafe_m=unsafe_length(path, space, request.safety_m, ends),
-        components=len(space.free.geoms),
-        free_area_m2=space.free.area,
-        judged_area=space.judged_area,
-        cover_radius_m=(cover.low_m, cover.high_m),
-        least_radius_m=least_m,
-        q=cover.high_m / least_m,
-        mean_distance_m=spread.mean_m,
-        p95_distance_m=spread.p95_m,
-        mean_ratio=spread.mean_m / (least_m / 2),
-        p95_ratio=spread.p95_m / least_m,
-        p99_distance_m=spread.p99_m,
-        p99_ratio=spread.p99_m / least_m,
-        least_leg_distance_m=least_leg_distance(path, spacing_m, meeting_legs),
-        discrepancy=positions.value if positions else None,
-        discrepancy_ratio=positions.ratio if positions else None,
-        directional_evenness=directional_evenness(path),
-        turns=count_turns(path, least_m),
-        kriging_variance_mean=kriging.mean if kriging else None,
-        kriging_variance_max=kriging.max if kriging else None,
-        worst_gap=cover.place,
+        **_conformance(request, space),
+        **_coverage(cover, spread, least_m),
+        **_evenness(request, space, least_m),
+        **_kriging(request, spread, least_m),
     )
     return Judgement(certificate, space, cover, spread)
+
+
+def _conformance(request: CertifyRequest, space: JudgedSpace) -> dict[str, Any]:
+    """What there is of water and path, and whether the path keeps the rules."""
+    path, ends = request.path, (request.launch, request.recovery)
+    crossings = count_crossings(path)
+    return {
+        "length_m": path.length,
+        "duration_s": path.length / request.speed_mps,
+        "waypoints": int(shapely.get_num_coordinates(path)),
+        "is_simple": crossings == 0,
+        "crossings": crossings,
+        "outside_m": outside_length(path, space),
+        "unsafe_m": unsafe_length(path, space, request.safety_m, ends),
+        "components": len(space.free.geoms),
+        "free_area_m2": space.free.area,
+        "judged_area": space.judged_area,
+    }
+
+
+def _coverage(cover: CoverRadius, spread: DistanceSpread, least_m: float) -> dict[str, Any]:
+    """How far the water is from the path."""
+    return {
+        "cover_radius_m": (cover.low_m, cover.high_m),
+        "least_radius_m": least_m,
+        "q": cover.high_m / least_m,
+        "mean_distance_m": spread.mean_m,
+        "p95_distance_m": spread.p95_m,
+        "p99_distance_m": spread.p99_m,
+        "mean_ratio": spread.mean_m / (least_m / 2),
+        "p95_ratio": spread.p95_m / least_m,
+        "p99_ratio": spread.p99_m / least_m,
+        "worst_gap": cover.place,
+    }
+
+
+def _evenness(request: CertifyRequest, space: JudgedSpace, least_m: float) -> dict[str, Any]:
+    """How evenly the path samples places and directions."""
+    path, spacing_m = request.path, 2.0 * least_m
+    ends = about_ends(space, (request.launch, request.recovery), max(2.0 * request.safety_m, spacing_m))
+    positions = discrepancy(space.judged, path, spacing_m, 2.0 * space.detail_m)
+    return {
+        "least_leg_distance_m": least_leg_distance(path, spacing_m, ends),
+        "discrepancy": positions.value if positions else None,
+        "discrepancy_ratio": positions.ratio if positions else None,
+        "directional_evenness": directional_evenness(path),
+        "turns": count_turns(path, least_m),
+    }
+
+
+def _kriging(request: CertifyRequest, spread: DistanceSpread, least_m: float) -> dict[str, Any]:
+    """How well the field could be told from what the path samples, where its variogram is known."""
+    if request.variogram is None:
+        return {}
+    variance = kriging_variance(request.path, spread.places, request.variogram, least_m)
+    return {"kriging_variance_mean": variance.mean, "kriging_variance_max": variance.max}

@@ -16,7 +16,9 @@ RED = (214, 47, 39)
 GAP_RATIO = 1.5
 """Places farther from the path than so many least radii are shown as gaps; ideal transects have none above 1."""
 
-SCALARS = ("length_m", "q", "mean_ratio", "p95_ratio", "outside_m", "unsafe_m", "judged_area", "crossings")
+RULES = ("length_m", "outside_m", "unsafe_m", "judged_area", "crossings", "turns")
+COVERAGE = ("q", "mean_ratio", "p95_ratio", "p99_ratio")
+EVENNESS = ("least_leg_distance_m", "discrepancy_ratio", "directional_evenness")
 
 
 def handle(request: CertifyRequest, show: Show) -> Certificate:
@@ -31,8 +33,9 @@ def handle(request: CertifyRequest, show: Show) -> Certificate:
     show(Layer(stage=STAGE, name="path", geometries=(request.path,)))
     show(_gaps(judgement))
     show(_worst_gap(judgement))
-    figures = {name: float(getattr(judgement.certificate, name)) for name in SCALARS}
-    show(Layer(stage=STAGE, name="figures", kind=LayerKind.SCALARS, scalars=figures))
+    figures = {name: getattr(judgement.certificate, name) for name in RULES + COVERAGE + EVENNESS}
+    known = {name: float(figure) for name, figure in figures.items() if figure is not None}
+    show(Layer(stage=STAGE, name="figures", kind=LayerKind.SCALARS, scalars=known))
     return judgement.certificate
 
 

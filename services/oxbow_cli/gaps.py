@@ -11,15 +11,16 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from shapely import LineString, MultiPolygon
+from shapely import LineString, MultiPolygon, Polygon
 
+from oxbow.contracts import CertifyRequest, Place
 from oxbow.mission import Mission
 from oxbow.site import Site
 from oxbow_certificate.certify import Judgement, judge
 from oxbow_certificate.distance import PathDistance
 from oxbow_cli import sheet
 from oxbow_cli.evaluation import certify_request
-from oxbow_cli.sheet import INK
+from oxbow_cli.sheet import GAP, INK
 
 __all__ = ["GAPS", "MOST_RADII", "draw_gaps"]
 
@@ -43,6 +44,10 @@ GAPS = LinearSegmentedColormap.from_list(
 """Blue as far as the best possible path would be from its farthest water, and warm beyond."""
 
 _PLACES = 250_000
+
+_MAGNIFIED_IN = 2.0
+_MAGNIFIED_RADII = 3.5
+"""How much of the worst gap's surroundings is drawn magnified, in radii of the gap."""
 
 
 def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
@@ -70,9 +75,9 @@ def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     judgement = judge(request)
     figure, axes = sheet.new_sheet(site)
     sheet.draw_site(axes, site, mission.safety_m)
-    _draw_distance(axes, judgement.space.judged, request.path, judgement.certificate.least_radius_m)
-    _draw_path(axes, request.path, site.nominal_spacing_m)
-    _draw_worst_gap(axes, judgement)
+    _draw_gaps(axes, judgement, request.path)
+    _note_worst_gap(axes, judgement)
+    _draw_magnified(figure, axes, site, judgement, request)
     sheet.draw_ends(axes, site)
     sheet.draw_scale_and_north(axes)
     _draw_key(figure, judgement.certificate.least_radius_m)
@@ -80,16 +85,68 @@ def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     sheet.save_sheet(figure, path, width_px)
 
 
+def _draw_gaps(axes: Axes, judgement: Judgement, path: LineString) -> None:
+    """The distance, the path, and the disc that the worst gap would hold."""
+    least_radius_m, radius_m = judgement.certificate.least_radius_m, judgement.cover.low_m
+    _draw_distance(axes, judgement.space.judged, path, least_radius_m)
+    width = 0.6 * sheet.line_width(axes, 2.0 * least_radius_m)
+    lines = LineCollection([shapely.get_coordinates(path)], colors=INK, linewidths=width, alpha=0.75, zorder=4)
+    axes.add_collection(lines, autolim=False)
+    sheet.draw_disc(axes, judgement.cover.place, radius_m)
+
+
+def _note_worst_gap(axes: Axes, judgement: Judgement) -> None:
+    (x, y), radius_m = judgement.cover.place, judgement.cover.low_m
+    radii = radius_m / judgement.certificate.least_radius_m
+    text = f"worst gap {sheet.distance_text(radius_m)}, {radii:.2f} least radii"
+    sheet.note(axes, (x, y + radius_m), text, colour=GAP)
+
+
+def _draw_magnified(figure: Figure, axes: Axes, site: Site, judgement: Judgement, request: CertifyRequest) -> None:
+    """The worst gap and the legs about it, beside the water; nowhere, where there is no room."""
+    x, y = judgement.cover.place
+    shown_m = _MAGNIFIED_RADII * judgement.cover.low_m
+    side_m = _MAGNIFIED_IN * (axes.get_xlim()[1] - axes.get_xlim()[0]) / figure.get_figwidth()
+    times = side_m / (2 * shown_m)
+    frame = _free_square(axes, site, judgement.cover.place, side_m)
+    if frame is None or times < 2.0:
+        return
+    corner = figure.transFigure.inverted().transform(axes.transData.transform(frame.bounds[:2]))
+    size = _MAGNIFIED_IN / figure.get_figwidth(), _MAGNIFIED_IN / figure.get_figheight()
+    inset = figure.add_axes((*corner, *size), facecolor=sheet.LAND, xticks=[], yticks=[])
+    inset.set(xlim=(x - shown_m, x + shown_m), ylim=(y - shown_m, y + shown_m))
+    sheet.draw_site(inset, site, request.safety_m)
+    _draw_gaps(inset, judgement, request.path)
+    inset.spines[:].set_color(GAP)
+    inset.set_title(f"the worst gap, {times:.2g} times larger", fontsize=8, color=GAP, loc="left", pad=4)
+
+
+def _free_square(axes: Axes, site: Site, place: Place, side_m: float) -> Polygon | None:
+    """The square of a side, of those that meet neither the water nor the map's rim, that is nearest to a place."""
+    (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
+    rim_m = 0.015 * (east - west)
+    corners_x = np.linspace(west + rim_m, east - 4 * rim_m - side_m, 24)
+    corners_y = np.linspace(south + rim_m, north - rim_m - side_m, 24)
+    x, y = (axis.ravel() for axis in np.meshgrid(corners_x, corners_y))
+    squares = shapely.box(x, y, x + side_m, y + side_m)
+    ends = shapely.MultiPoint([site.launch, site.recovery]).buffer(4 * rim_m)
+    occupied = site.outline.union(ends).buffer(rim_m)
+    free = squares[~shapely.intersects(occupied, squares)]
+    return min(free, key=shapely.Point(place).distance, default=None)
+
+
 def _draw_distance(axes: Axes, region: MultiPolygon, path: LineString, least_radius_m: float) -> None:
     """The distance on a grid, clipped to the region."""
-    west, south, east, north = region.bounds
-    pixel_m = (axes.get_xlim()[1] - axes.get_xlim()[0]) / 2000
-    step_m = max(math.sqrt(region.area / _PLACES), pixel_m)
+    (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
+    pixel_m = (east - west) / 2000
+    seen = shapely.clip_by_rect(region, west, south, east, north)
+    west, south, east, north = seen.bounds
+    step_m = max(math.sqrt(seen.area / _PLACES), pixel_m)
     x = np.arange(west - step_m, east + 2 * step_m, step_m)
     y = np.arange(south - step_m, north + 2 * step_m, step_m)
     places = np.stack(np.meshgrid(x, y), axis=-1)
     # Two steps beyond the region, so that its border is coloured to the edge.
-    near = region.buffer(2 * step_m)
+    near = seen.buffer(2 * step_m)
     shapely.prepare(near)
     wanted = shapely.contains_xy(near, places[..., 0], places[..., 1])
     radii = np.full(wanted.shape, np.nan)
@@ -105,22 +162,9 @@ def _draw_distance(axes: Axes, region: MultiPolygon, path: LineString, least_rad
         aspect="auto",
         zorder=3.5,
     )
-    clip = sheet.patch(region, facecolor="none", edgecolor="none")
+    clip = sheet.patch(seen, facecolor="none", edgecolor="none")
     axes.add_patch(clip)
     image.set_clip_path(clip)
-
-
-def _draw_path(axes: Axes, path: LineString, spacing_m: float) -> None:
-    width = 0.6 * sheet.line_width(axes, spacing_m)
-    lines = LineCollection([shapely.get_coordinates(path)], colors=INK, linewidths=width, alpha=0.75, zorder=4)
-    axes.add_collection(lines, autolim=False)
-
-
-def _draw_worst_gap(axes: Axes, judgement: Judgement) -> None:
-    radius_m = judgement.cover.low_m
-    radii = radius_m / judgement.certificate.least_radius_m
-    text = f"worst gap {sheet.distance_text(radius_m)}, {radii:.2f} least radii"
-    sheet.draw_gap(axes, judgement.cover.place, radius_m, text)
 
 
 def _draw_key(figure: Figure, least_radius_m: float) -> None:

@@ -94,7 +94,8 @@ def _draw_findings(axes: Axes, mission: Mission, site: Site) -> None:
     if certificate.worst_gap is not None:
         x, y = site.frame.to_planar(lonlat([certificate.worst_gap]))[0]
         radius_m = certificate.cover_radius_m[0]
-        sheet.draw_gap(axes, (x, y), radius_m, f"widest gap {sheet.distance_text(radius_m)}")
+        sheet.draw_disc(axes, (x, y), radius_m)
+        sheet.note(axes, (x, y + radius_m), f"widest gap {sheet.distance_text(radius_m)}", colour=GAP)
 
 
 def _draw_progress_key(figure: Figure) -> None:

@@ -27,13 +27,14 @@ from oxbow_certificate.erosion import eroded
 __all__ = [
     "GAP",
     "INK",
+    "LAND",
     "WATER",
     "add_key",
     "area_text",
     "checked_format",
     "distance_text",
+    "draw_disc",
     "draw_ends",
-    "draw_gap",
     "draw_header",
     "draw_scale_and_north",
     "draw_site",
@@ -195,12 +196,11 @@ def line_width(axes: Axes, spacing_m: float) -> float:
     return min(max(0.3 * spacing_m * points_per_m, 0.35), 1.6)
 
 
-def draw_gap(axes: Axes, place: Place, radius_m: float, text: str) -> None:
+def draw_disc(axes: Axes, place: Place, radius_m: float) -> None:
     """The disc that a gap would hold."""
     axes.add_patch(
         Circle(place, radius_m, facecolor="none", edgecolor=GAP, linewidth=1.1, linestyle=(0, (3, 2)), zorder=6)
     )
-    note(axes, (place[0], place[1] + radius_m), text, colour=GAP)
 
 
 def _map_height_in(axes: Axes) -> float:

@@ -17,6 +17,7 @@ from oxbow.contracts import Certificate, CertifyRequest
 from oxbow.errors import Infeasible
 from oxbow.mission import mission_json, read_mission
 from oxbow.pipeline import plan_mission
+from oxbow.plan import PlanOptions
 from oxbow.recording import Layer, discard
 from oxbow.testing import nasty_polygons
 from oxbow_certificate.conformance import count_crossings
@@ -187,7 +188,8 @@ def test_agrees_with_the_independent_judge(name):
     assert spec is not None
     referee = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(referee)
-    mission = plan_mission(read_mission(SHARED / f"data/missions/{name}.json"), call=local_call())
+    options = PlanOptions(time_limit_s=0.1)
+    mission = plan_mission(read_mission(SHARED / f"data/missions/{name}.json"), options, call=local_call())
     judged = referee.judge(json.loads(mission_json(mission)))
     assert mission.plan is not None
     for own in (mission.plan.certificate, evaluate(mission)):
