@@ -51,7 +51,7 @@ def main() -> None:
     planned = plan_mission(mission, call=local_call(keep))
     draw_stages(layers, FOLDER / "images" / "stages.png")
     draw_quality(layers, planned, FOLDER / "images" / "quality.png")
-    draw_gaps(planned, FOLDER / "images" / "gaps.png", width_px=900)
+    draw_gaps(planned, FOLDER / "images" / "gaps.png", width_px=840)
     draw_plans(FOLDER / "images" / "plans.png")
 
 
