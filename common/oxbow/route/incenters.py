@@ -18,12 +18,16 @@ import numpy as np
 from oxbow.contracts import FloatArray
 from oxbow.route.channel import Channel
 from oxbow.route.mesh import cross
+from oxbow.route.sights import Mask
 from oxbow.route.triangulation import Indices
 
 __all__ = ["incenter_line", "incenters"]
 
 MARGIN = 0.02
 """A line passes gates this share of their width away from their ends."""
+
+GATES_AHEAD = 32
+"""Straight lines through channels hardly ever pass more gates: only for those that do, all gates are looked at."""
 
 
 def incenter_line(channel: Channel) -> FloatArray:
@@ -48,21 +52,30 @@ def incenter_line(channel: Channel) -> FloatArray:
 
 def _in_line(here: int, points: FloatArray, triangle: Indices, channel: Channel) -> Indices:
     """The points ahead that a straight line leads to through all gates in between; the next one always counts."""
-    left, right = channel.left[triangle[here] :], channel.right[triangle[here] :]
-    ahead = np.arange(here + 1, len(points))
-    if not len(left):
-        return ahead
-    margin = MARGIN * (right - left)
-    axis = (left[0] + right[0]) / 2 - points[here]
-    # Directions relative to the first gate: those of a straight line's gates are within half a turn of it.
-    open_to = np.minimum.accumulate(_direction_rad(left + margin - points[here], axis))
-    open_from = np.maximum.accumulate(_direction_rad(right - margin - points[here], axis))
-    towards = _direction_rad(points[ahead] - points[here], axis)
-    gates = triangle[ahead] - triangle[here]
-    passes = (towards < open_to[gates - 1]) & (towards > open_from[gates - 1])
-    passes |= gates == 0
+    first, last = triangle[here], len(channel.left)
+    for gates in (GATES_AHEAD, last):
+        window = slice(first, min(first + gates, last))
+        ahead = np.arange(here + 1, np.searchsorted(triangle, window.stop, side="right"))
+        left, right = channel.left[window] - points[here], channel.right[window] - points[here]
+        passes, is_closed = _passing(points[ahead] - points[here], triangle[ahead] - first, left, right)
+        if is_closed or window.stop == last:
+            break
     passes[0] = True
     return np.asarray(ahead[passes])
+
+
+def _passing(towards: FloatArray, gates: Indices, left: FloatArray, right: FloatArray) -> tuple[Mask, bool]:
+    """Which directions, shape (n, 2), pass so many gates, and whether none passes them all."""
+    if not len(left):
+        return np.ones(len(towards), dtype=np.bool_), False
+    axis = (left[0] + right[0]) / 2
+    margin = MARGIN * (right - left)
+    # Angles to the middle of the first gate: a straight line is within half a turn of the ends of all its gates.
+    open_to = np.minimum.accumulate(_direction_rad(left + margin, axis))
+    open_from = np.maximum.accumulate(_direction_rad(right - margin, axis))
+    direction = _direction_rad(towards, axis)
+    passes = (direction < open_to[gates - 1]) & (direction > open_from[gates - 1])
+    return np.asarray(passes | (gates == 0)), bool(open_to[-1] <= open_from[-1])
 
 
 def _direction_rad(vectors: FloatArray, axis: FloatArray) -> FloatArray:
