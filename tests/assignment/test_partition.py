@@ -1,6 +1,7 @@
 """Shares tile the mesh, hang together, and are as large as capacities ask for."""
 
 import math
+from pathlib import Path
 
 import networkx as nx
 import numpy as np
@@ -12,13 +13,19 @@ from path_requests import lake
 from shapely import Polygon, affinity, box
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.contracts import ContourRequest
 from oxbow.errors import InvalidMission
 from oxbow.mesh import Mesh, mesh_area
+from oxbow.mission import read_mission
+from oxbow.recording import discard
+from oxbow.site import Site
 from oxbow.testing import nasty_polygons
 from oxbow_assignment.partition import BALANCE, Partition, balanced_partition, wavefront_partition
+from oxbow_contour.service import handle as contour
 
 quick = settings(deadline=None, max_examples=8, derandomize=True)
 
+LAKES = sorted((Path(__file__).parents[2] / "../shared/data/missions").glob("*.json"))
 TRIANGLES = 220
 """For each share, about."""
 
@@ -74,6 +81,23 @@ def test_shares_of_nasty_shapes_are_balanced(name, vehicles):
     partition = balanced_partition(mesh_for(area, vehicles), [start] * vehicles, capacities)
     require_shares(partition, area)
     assert partition.imbalance <= BALANCE
+
+
+@pytest.mark.skipif(not LAKES, reason="needs the shared missions")
+@pytest.mark.parametrize("path", LAKES, ids=lambda path: path.stem)
+def test_shares_of_real_lakes_are_balanced(path):
+    mission = read_mission(path)
+    site = Site.of(mission)
+    water = ContourRequest(
+        outline=site.outline, zones=site.zones, safety_m=mission.safety_m, spacing_m=site.nominal_spacing_m
+    )
+    free = contour(water, discard).free
+    mesh = mesh_area(free, 2 * site.nominal_spacing_m)
+    for vehicles in (2, 3, 8):
+        for capacities in (np.ones(vehicles), 1.0 + np.arange(vehicles)):
+            partition = balanced_partition(mesh, [site.launch] * vehicles, capacities)
+            assert partition.imbalance <= BALANCE
+        require_shares(partition, free)
 
 
 def star() -> Polygon:
