@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from oxbow.contracts import FloatArray
 from oxbow.errors import InvalidMission
-from oxbow_assignment.fleet import Role, Vehicle
+from oxbow.contracts import Role, Vehicle
 
 __all__ = ["ROUNDING", "BoolArray", "IntArray", "Objective", "Problem", "require_distances"]
 

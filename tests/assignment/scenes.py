@@ -7,7 +7,7 @@ from scipy.spatial.distance import cdist
 
 from oxbow.contracts import FloatArray
 from oxbow_assignment.assignment import Assignment
-from oxbow_assignment.fleet import Role, Vehicle
+from oxbow.contracts import Role, Vehicle
 from oxbow_assignment.problem import Objective, Problem
 
 SIDE_M = 1_000.0

@@ -19,7 +19,7 @@ from oxbow.route import RouteMethod, Router, make_router
 from oxbow.site import Site
 from oxbow_assignment.assign import Clustering, ClusterMethod, assign, cluster_paths
 from oxbow_assignment.assignment import Assignment, assignment_of
-from oxbow_assignment.fleet import Vehicle
+from oxbow.contracts import Vehicle
 from oxbow_assignment.joint import gap_to, is_available, optimise
 from oxbow_assignment.problem import Objective, Problem
 
