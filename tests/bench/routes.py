@@ -34,9 +34,15 @@ CHANGES = 50
 
 def measure() -> Iterator[Section]:
     """Three tables: methods on random scenes, all pairs by the visibility graph, changes of obstacles."""
+    rows = [_method_row(method, vertices, islands) for vertices, islands in LAKES for method in RouteMethod]
+    lattice, clear = ([row for row in rows if row["method"] == method] for method in ("tessellation", "incenters"))
     yield Section(
         "Routes by method, against the exact length, on random scenes",
-        [_method_row(method, vertices, islands) for vertices, islands in LAKES for method in RouteMethod],
+        rows,
+        goals=[
+            Goal("lattice, 95th", max(float(row["95th"]) for row in lattice), " %", at_most=1.5),
+            Goal("incenters, least clearance", min(float(row["least"]) for row in clear), " m", at_least=1.0),
+        ],
         note=f"clearance: least distance from the shore, of routes whose ends are {OFFSHORE_M:g} m from it",
     )
     rows = [_pairs_row(vertices, islands) for vertices, islands in ALL_PAIRS]

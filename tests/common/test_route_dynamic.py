@@ -9,7 +9,7 @@ from route_scenes import obstacle, places_in, scene
 from shapely import Polygon, box
 
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.route import DynamicRouter, RouteMethod, make_router
+from oxbow.route import Danger, DangerZone, DynamicRouter, RouteMethod, make_router
 from oxbow.testing import nasty_polygons
 
 quick = settings(deadline=None, max_examples=12, derandomize=True)
@@ -128,3 +128,15 @@ def test_bad_obstacles_are_named_and_change_nothing():
         router.put("flood", box(-1, -1, 101, 101))
     assert router.mesh is mesh
     assert list(router.obstacles) == ["wreck"]
+
+
+def test_danger_on_the_way_is_told():
+    danger = Danger((DangerZone("shallows", box(30, 20, 70, 100), 0.05),), c_max_m=1e4)
+    router = DynamicRouter(box(0, 0, 100, 100), danger)
+    router.put("wreck", box(45, 45, 55, 55))
+    straight = router.route((10, 60), (90, 60))
+    assert straight.danger == pytest.approx(
+        1 - 0.95 ** straight.line.intersection(box(30, 20, 70, 100)).length, abs=1e-4
+    )
+    assert straight.cost > straight.length_m + 1e4
+    assert router.distances([(10, 60), (90, 60)])[0, 1] == pytest.approx(straight.cost)
