@@ -23,8 +23,11 @@ __all__ = ["enclosed"]
 QUAD_SEGS = 2
 """Lanes have ends of few corners: every corner is a waypoint."""
 
-PARTING = 4
-"""A place where so many stretches of a tour end is one where it meets itself."""
+GRID_M = 1e-7
+"""A tour that comes nearer to itself than this touches itself."""
+
+PARTING = 3
+"""Where so many stretches of a tour end, it meets itself."""
 
 
 def enclosed(way: FloatArray, free: Polygon, lane_m: float) -> Polygon:
@@ -41,15 +44,20 @@ def enclosed(way: FloatArray, free: Polygon, lane_m: float) -> Polygon:
     """
     if (way == way[0]).all():
         return largest(Point(way[0]).buffer(lane_m).intersection(free))
-    stretches = shapely.get_parts(shapely.union_all([LineString(way)]))
+    stretches = shapely.get_parts(shapely.union_all([LineString(way)], grid_size=GRID_M))
     faces = shapely.get_parts(shapely.polygonize(stretches))
     region = shapely.union_all([Polygon(), *faces[_is_odd(faces, way)]])
     twice = stretches[~shapely.covers(region.boundary, stretches)]
     inside = shapely.covers(region, twice)
     slits, lanes, joints = (
-        shapely.union_all(shapely.buffer(lines, lane_m, quad_segs=QUAD_SEGS))
-        for lines in (twice[inside], twice[~inside], _meetings(stretches))
+        shapely.union_all(shapely.buffer(lines, half_width_m, quad_segs=QUAD_SEGS))
+        for lines, half_width_m in (
+            (twice[inside], lane_m / 2),
+            (twice[~inside], lane_m),
+            (_meetings(stretches), lane_m),
+        )
     )
+    # Joints are wider than slits, to reach what lies on either side.
     return largest(region.difference(slits).union(lanes.union(joints).intersection(free)))
 
 

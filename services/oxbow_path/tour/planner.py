@@ -58,7 +58,7 @@ LEAST_SITES = 4
 NEAR = 4.0
 """Sites no farther apart than this may follow each other, in pitches."""
 
-GAP = 1.0
+GAP = 0.85
 """Water farther than this from every site is given one more, in pitches."""
 
 LANE = 0.1

@@ -22,8 +22,8 @@ LEAST_M = 1e-9
 def pruned(order: Indices, geodesics: Geodesics, *, kept: int, length_m: float) -> Indices:
     """Leave out sites until a tour is short enough.
 
-    The next to go is the one that saves most for the distance from the tour of the water that it stood for, its own
-    and that of sites left out before: so all arms become shorter alike.
+    The next to go is the one that saves most for how far from the tour its water will be, and the water of those
+    left out beyond it: so all arms become shorter alike.
 
     Parameters
     ----------
