@@ -15,13 +15,13 @@ from shapely import Polygon, box
 from oxbow.contracts import PathRequest
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.mesh import Mesh, mesh_area, propagate
-from oxbow.sweep import from_sweep, to_sweep
+from oxbow.recording import Layer
+from oxbow.sweep import from_sweep
 from oxbow.testing import nasty_polygons
 from oxbow_path.conformance import require_conforming
-from oxbow_path.legs import Passable, access
-from oxbow_path.probe import Probe
 from oxbow_path.routes import Routes
 from oxbow_path.spacing import Budget
+from oxbow_path.task import Display, Task
 from oxbow_path.transect import Waters
 from oxbow_path.watershed import (
     CellPath,
@@ -29,6 +29,7 @@ from oxbow_path.watershed import (
     coverage_depth,
     plan_watershed,
     shortest_path,
+    watershed,
     watershed_path,
 )
 from oxbow_path.watershed.contours import contour_tree
@@ -134,21 +135,7 @@ def test_a_goal_that_no_wave_reached_is_named():
 
 
 def waters_of(asked: PathRequest) -> Waters:
-    turn = partial(to_sweep, heading_rad=asked.decomposition.heading_rad)
-    free, water = (shapely.transform(area, turn) for area in (asked.space.free, asked.space.water))
-    launch, recovery = turn(np.array([asked.launch, asked.recovery]))
-    spacing_m = free.area / asked.length_m
-    shore = Routes(water, spacing_m)
-    return Waters(
-        spacing_m=spacing_m,
-        cells=asked.decomposition.cells,
-        free=free,
-        passable=Passable(free),
-        probe=Probe.over(free, 0.35 * spacing_m),
-        routes=Routes(free, 0.35 * spacing_m),
-        launch=access(tuple(launch), free, shore, where="LaunchPoint"),
-        recovery=access(tuple(recovery), free, shore, where="RecoveryPoint"),
-    )
+    return Task.of(asked, lambda: False).waters
 
 
 def planned(asked: PathRequest) -> WatershedPlan:
@@ -178,6 +165,19 @@ def test_paths_over_nasty_shapes_are_sound(name):
         planned(request(nasty_polygons()[name], spacings=8.0))
     except Infeasible as error:
         assert "Master_length" in str(error) or "Safety" in str(error)
+
+
+def test_the_refined_path_is_sound_and_shown():
+    asked = request(lake(3), spacings=12.0)
+    layers: list[Layer] = []
+    steps = iter(range(6))
+    task = Task.of(asked, lambda: next(steps, None) is None)
+    plan = watershed(task, Display(layers.append, asked.decomposition.heading_rad))
+    require_conforming(
+        shapely.transform(plan.path, partial(from_sweep, heading_rad=asked.decomposition.heading_rad)), asked
+    )
+    assert plan.path.length >= 0.95 * asked.length_m
+    assert {"iterations", "contours", "links", "refined"} <= {layer.name for layer in layers}
 
 
 def test_launch_and_recovery_apart():

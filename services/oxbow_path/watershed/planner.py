@@ -12,14 +12,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 
-import numpy as np
 from shapely import Polygon
 
+from oxbow.contracts import SpacingStep
 from oxbow.errors import Infeasible
 from oxbow_path.circuit import Circuit
 from oxbow_path.gaps import reach_gaps
+from oxbow_path.planner import ENOUGH, _score
+from oxbow_path.refinement import Polyline, refined
 from oxbow_path.remainder import with_remainder
 from oxbow_path.spacing import Budget, fitted
+from oxbow_path.task import Display, MethodPlan, Task
 from oxbow_path.transect import (
     STRAIGHTENING,
     Pattern,
@@ -34,7 +37,7 @@ from oxbow_path.transect import (
 from oxbow_path.walk import Brush, Walk, simply_connected
 from oxbow_path.watershed.contours import contour_tree
 
-__all__ = ["WatershedPlan", "plan_watershed", "try_contours"]
+__all__ = ["WatershedPlan", "plan_watershed", "try_contours", "watershed"]
 
 REACHES = (1.5, 1.3, 1.8)
 FIRST_SPACING = 1.15
@@ -47,6 +50,33 @@ class WatershedPlan:
 
     chosen: Trial
     trials: tuple[Trial, ...]
+
+
+def watershed(task: Task, display: Display) -> MethodPlan:
+    """Plan a path along contours of the distance to the shore, and refine it.
+
+    Raises
+    ------
+    Infeasible
+        No path that was tried is short enough.
+    """
+    plan = plan_watershed(task.waters, Budget(task.length_m, ENOUGH * task.length_m, task.least_spacing_m))
+    for step, trial in enumerate(plan.trials):
+        display.lines("iterations", [trial.path], step=step, labels=(f"spacing {trial.pattern.spacing_m:.1f} m",))
+    chosen = plan.chosen
+    display.lines("contours", chosen.circuit.transects)
+    display.lines("links", chosen.circuit.links)
+    path = refined(
+        Polyline.of(chosen.path, task.waters.passable.free_and_rounding),
+        task.waters.free,
+        task.samples,
+        length_m=max(chosen.length_m, task.useful_length_m),
+        spacing_m=task.spacing_m,
+        stop=task.stop,
+        watch=display.refinement,
+    )
+    steps = tuple(SpacingStep(spacing_m=trial.pattern.spacing_m, length_m=trial.length_m) for trial in plan.trials)
+    return MethodPlan(path, chosen.pattern.spacing_m, chosen.pattern.reach_m, steps)
 
 
 def plan_watershed(waters: Waters, budget: Budget) -> WatershedPlan:
@@ -78,13 +108,6 @@ def plan_watershed(waters: Waters, budget: Budget) -> WatershedPlan:
     if chosen.pattern.spacing_m > budget.least_spacing_m:
         chosen = with_remainder(chosen, waters, budget)
     return WatershedPlan(chosen, tuple(trials))
-
-
-def _score(trial: Trial, waters: Waters, budget: Budget) -> float:
-    """As for transects: the largest distance and its 95th percentile, charged for length that is left unused."""
-    distance = waters.probe.distances(trial.path)
-    unused = max(0.0, budget.enough_m / trial.length_m - 1.0)
-    return float(distance.max() + np.quantile(distance, 0.95)) * (1.0 + unused)
 
 
 def try_contours(waters: Waters, pattern: Pattern) -> Trial:
