@@ -24,6 +24,7 @@ from oxbow.contracts import (
     ANY,
     DEFAULT_DEADLINE_S,
     PLAN_KEY,
+    Draw,
     Method,
     MissionKey,
     MissionStatus,
@@ -51,6 +52,8 @@ class Options(TypedDict, total=False):
     heading_rad: float | None
     tolerance_m: float | None
     time_limit_s: float | None
+    smooth: bool
+    draw: Draw
 
 
 @dataclass(frozen=True)

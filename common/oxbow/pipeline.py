@@ -84,6 +84,8 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
             seed=options.seed,
             weighted_areas=site.weighted_areas,
             time_limit_s=options.time_limit_s,
+            smooth=options.smooth,
+            draw=options.draw,
         ),
     )
     certificate = call(

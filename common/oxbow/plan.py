@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from oxbow.contracts import Measures, Message, Method, require_finite
+from oxbow.contracts import Draw, Measures, Message, Method, require_finite
 from oxbow.frame import Position
 
 __all__ = ["DroppedWater", "PlanCertificate", "PlanOptions", "PlanRecord"]
@@ -13,7 +13,7 @@ class PlanOptions(Message, frozen=True, kw_only=True):
 
     `time_limit_s` is how long the path method may spend on improving the path. By default it does a fixed amount
     of work, so that the same request gives the same plan on every machine; with a limit it stops earlier, and
-    the plan depends on the machine.
+    the plan depends on the machine. `smooth` asks for rounded corners; `draw` matters to the space-filling curve.
     """
 
     method: Method = Method.SPACE_FILLING_CURVE
@@ -21,6 +21,8 @@ class PlanOptions(Message, frozen=True, kw_only=True):
     heading_rad: float | None = None
     tolerance_m: float | None = None
     time_limit_s: float | None = None
+    smooth: bool = False
+    draw: Draw = Draw.LOW_DISCREPANCY
 
     def __post_init__(self) -> None:
         require_finite(self, "heading_rad")

@@ -92,6 +92,10 @@ def plan(
             help="Improve the path for so many seconds at most, in place of a fixed amount of work.",
         ),
     ] = None,
+    smooth: Annotated[bool, typer.Option("--smooth", help="Round the path's corners.")] = False,
+    draw: Annotated[
+        str, typer.Option(help="How SpaceFillingCurve draws its inputs: low-discrepancy or convex-combination.")
+    ] = "low-discrepancy",
     timeout: Annotated[float, typer.Option(metavar="S", min=0.001, help="Give up after so many seconds.")] = 120.0,
     home: Home = None,
     json: AsJson = False,
@@ -117,7 +121,9 @@ def plan(
 
     require_compatible(local=local, connect=connect, record=record, time_limit_s=time_limit, timeout_s=timeout)
     mission = with_prior(read_mission(file), prior)
-    options = plan_options(method, seed, heading, time_limit)
+    options = plan_options(
+        method, seed=seed, heading_deg=heading, time_limit_s=time_limit, smooth=smooth, draw=draw
+    )
     with report.progress_bar(shown=not json) as progress:
         job = Job(mission, options, timeout, progress)
         if local:

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import enum
 import math
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 import msgspec
 
 from oxbow.bus import DEFAULT_ENDPOINT
-from oxbow.contracts import Method
+from oxbow.contracts import Draw, Method
 from oxbow.errors import InvalidMission
 from oxbow.frame import Position
 from oxbow.mission import Mission, write_mission
 from oxbow.plan import PlanOptions
 from oxbow.prior_file import read_prior
+
+E = TypeVar("E", bound=enum.StrEnum)
 
 __all__ = [
     "endpoint",
@@ -49,12 +53,24 @@ def position(text: str, where: str) -> Position:
     return Position(lat=lat, long=long)
 
 
-def plan_options(method: str, seed: int, heading_deg: float | None, time_limit_s: float | None) -> PlanOptions:
+def plan_options(
+    method: str, *, seed: int, heading_deg: float | None, time_limit_s: float | None, smooth: bool, draw: str
+) -> PlanOptions:
     """How to plan."""
-    if method not in set(Method):
-        raise InvalidMission(f"is {method!r}; expected {' or '.join(Method)}", where="--method")
-    heading_rad = None if heading_deg is None else math.radians(heading_deg)
-    return PlanOptions(method=Method(method), seed=seed, heading_rad=heading_rad, time_limit_s=time_limit_s)
+    return PlanOptions(
+        method=_one_of(Method, method, "--method"),
+        seed=seed,
+        heading_rad=None if heading_deg is None else math.radians(heading_deg),
+        time_limit_s=time_limit_s,
+        smooth=smooth,
+        draw=_one_of(Draw, draw, "--draw"),
+    )
+
+
+def _one_of(names: type[E], text: str, where: str) -> E:
+    if text not in set(names):
+        raise InvalidMission(f"is {text!r}; expected {' or '.join(names)}", where=where)
+    return names(text)
 
 
 def with_prior(mission: Mission, prior: Path | None) -> Mission:

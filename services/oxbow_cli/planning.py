@@ -78,6 +78,8 @@ def plan_on(job: Job, endpoint: str) -> Planned:
             seed=options.seed,
             heading_rad=options.heading_rad,
             time_limit_s=options.time_limit_s,
+            smooth=options.smooth,
+            draw=options.draw,
         )
     return Planned(planned)
 

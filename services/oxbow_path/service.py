@@ -15,6 +15,7 @@ from oxbow_path.conformance import require_conforming
 from oxbow_path.dropped import dropped_parts
 from oxbow_path.legs import Access
 from oxbow_path.planner import transects
+from oxbow_path.refinement import Polyline, smoothed
 from oxbow_path.ring import space_filling_curve
 from oxbow_path.task import Display, MethodPlan, PathMethod, Stop, Task, finest_spacing_m
 
@@ -34,8 +35,9 @@ def handle(request: PathRequest, show: Show) -> PathPlan:
     task = Task.of(request, _stop(request.time_limit_s))
     display = Display(show, request.decomposition.heading_rad)
     plan = METHODS[request.method](task, display)
-    display.lines("path", [plan.path])
-    path = _from_launch_to_recovery(shapely.transform(plan.path, display.back), request)
+    found = _smoothed(plan.path, task) if request.smooth else plan.path
+    display.lines("path", [found])
+    path = _from_launch_to_recovery(shapely.transform(found, display.back), request)
     require_conforming(path, request)
     return PathPlan(
         path=path,
@@ -44,6 +46,11 @@ def handle(request: PathRequest, show: Show) -> PathPlan:
         dropped=dropped_parts(path, request.space.free, plan.reach_m),
         warnings=(*_leg_warnings(task), *_length_warnings(plan, request)),
     )
+
+
+def _smoothed(path: LineString, task: Task) -> LineString:
+    polyline = Polyline.of(path, task.waters.passable.free_and_rounding)
+    return smoothed(polyline, task.waters.free, task.spacing_m)
 
 
 def _stop(limit_s: float | None) -> Stop:

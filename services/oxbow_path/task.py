@@ -85,7 +85,8 @@ class Task:
         _require_connected(request)
         least_spacing_m = max(request.min_spacing_m, finest_spacing_m(request.space))
         nominal_m = max(request.space.free.area / request.length_m, least_spacing_m)
-        return cls(request, prepared_waters(request, nominal_m), LENGTH_USED * request.length_m, least_spacing_m, stop)
+        waters = prepared_waters(request, nominal_m)
+        return cls(request, waters, LENGTH_USED * request.length_m, least_spacing_m, stop)
 
     @property
     def spacing_m(self) -> float:

@@ -71,7 +71,7 @@ class Polyline:
         """The path."""
         return LineString(self.nodes)
 
-    @property
+    @cached_property
     def segments(self) -> npt.NDArray[np.object_]:
         """Each segment as a line, shape (n - 1,)."""
         return _segments(self.nodes)
@@ -84,13 +84,20 @@ class Polyline:
         """With nodes added so that no segment is longer than `most_m`, but for legs and rigid ones."""
         pieces = np.maximum(1, np.ceil(self.lengths_m / most_m).astype(int))
         pieces[self.legs | self.rigid] = 1
+        return self._cut(pieces)
+
+    def subdivided(self, pieces: int) -> Polyline:
+        """With every segment cut into so many equal ones."""
+        return self._cut(np.full(len(self.legs), pieces))
+
+    def _cut(self, pieces: Indices) -> Polyline:
         segment = np.repeat(np.arange(len(pieces)), pieces)
         piece = np.arange(len(segment)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
         share = (piece / pieces[segment])[:, None]
         nodes = self.nodes[segment] + share * np.diff(self.nodes, axis=0)[segment]
         return Polyline(
             np.vstack([nodes, self.nodes[-1:]]),
-            np.append(self.pinned[segment] & (piece == 0), self.pinned[-1]),
+            np.append(self.pinned[segment] & ((piece == 0) | self.legs[segment]), self.pinned[-1]),
             self.legs[segment],
             self.rigid[segment],
         )

@@ -58,7 +58,7 @@ def feet(path: Polyline, points: FloatArray, spacing_m: float) -> Feet:
     piece = np.arange(len(owner)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     edge = np.diff(path.nodes, axis=0)
     along = path.nodes[owner] + ((piece + 0.5) / pieces[owner])[:, None] * edge[owner]
-    _, nearest = cKDTree(along, balanced_tree=False, compact_nodes=False).query(points)
+    _, nearest = cKDTree(along, balanced_tree=False, compact_nodes=False).query(points, workers=-1)
     best = np.full(len(points), np.inf)
     segment, share = owner[nearest], np.zeros(len(points))
     squared_m2 = np.maximum(path.lengths_m**2, np.finfo(float).tiny)

@@ -107,7 +107,7 @@ def organised(
 def _means(ring: Polyline, draws: FloatArray, weights: FloatArray, width: float) -> FloatArray:
     """Where each node's neighbourhood has its mean, shape (n, 2)."""
     count = len(ring.nodes)
-    _, winner = cKDTree(ring.nodes, balanced_tree=False, compact_nodes=False).query(draws)
+    _, winner = cKDTree(ring.nodes, balanced_tree=False, compact_nodes=False).query(draws, workers=-1)
     sums = np.column_stack([np.bincount(winner, weights * column, count) for column in (1.0, *draws.T)])
     spread = gaussian_filter1d(sums, width, axis=0, mode="wrap" if ring.is_closed else "constant")
     drawn = spread[:, 0] > LEAST_DRAWS * weights.mean()
