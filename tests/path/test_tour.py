@@ -229,12 +229,14 @@ def test_the_outline_of_any_tour_is_one_ring_near_all_its_places(way, places):
 
 @quick
 @given(seed=st.integers(0, 10_000), count=st.integers(2, 40))
-def test_the_outline_of_a_random_tour_is_one_ring(seed, count):
+def test_the_outline_of_a_random_tour_is_in_one_piece_and_inside(seed, count):
     sites = low_discrepancy(HORSESHOE, count, seed=seed)
     order = np.random.default_rng(seed).permutation(count)
-    region = enclosed(Shore(HORSESHOE).geodesics(sites).way(order), HORSESHOE, 0.5)
+    way = Shore(HORSESHOE).geodesics(sites).way(order)
+    region = enclosed(way, HORSESHOE, 0.5)
     assert region.is_valid
     assert HORSESHOE.buffer(1e-6).covers(region)
+    assert region.buffer(1.0).covers(LineString(way))
 
 
 # --------------------------------------------------------------------------- paths

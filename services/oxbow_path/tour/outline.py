@@ -3,9 +3,10 @@
 A tour of shortest ways may touch itself, and run twice along one way: at the corners of the shore that several
 legs turn round, and wherever the way in is the way out. A heuristic's tour may cross itself, too. So the path is
 not the tour but the boundary of the region that the tour encloses by the even-odd rule. Ways travelled twice
-become lanes: added to the region outside it, taken from it inside. Where parts of it only touch, a disc joins
-them. The holes that this leaves are opened as those of a walk round a tree are (`oxbow_path.walk`). What results
-is one region without holes, inside the water, whose boundary is simple by construction.
+become lanes: added to the region outside it, taken from it inside unless that parts it. Where parts of it only
+touch, a disc joins them. So it is in one piece, as the tour is. Holes are opened as those of a walk round a tree
+are (`oxbow_path.walk`). What results is one region without holes, inside the water, whose boundary is simple by
+construction.
 """
 
 from __future__ import annotations
@@ -49,16 +50,18 @@ def enclosed(way: FloatArray, free: Polygon, lane_m: float) -> Polygon:
     region = shapely.union_all([Polygon(), *faces[_is_odd(faces, way)]])
     twice = stretches[~shapely.covers(region.boundary, stretches)]
     inside = shapely.covers(region, twice)
-    slits, lanes, joints = (
-        shapely.union_all(shapely.buffer(lines, half_width_m, quad_segs=QUAD_SEGS))
-        for lines, half_width_m in (
-            (twice[inside], lane_m / 2),
-            (twice[~inside], lane_m),
-            (_meetings(stretches), lane_m),
-        )
-    )
-    # Joints are wider than slits, to reach what lies on either side.
-    return largest(region.difference(slits).union(lanes.union(joints).intersection(free)))
+    added = shapely.buffer([*twice[~inside], *_meetings(stretches)], lane_m, quad_segs=QUAD_SEGS)
+    region = largest(region.union(shapely.union_all(added).intersection(free)))
+    return _slit(region, shapely.buffer(twice[inside], lane_m, quad_segs=QUAD_SEGS))
+
+
+def _slit(region: Polygon, slits: npt.NDArray[np.object_]) -> Polygon:
+    """The region less all slits that do not part it."""
+    for slit in slits:
+        rest = region.difference(slit)
+        if isinstance(rest, Polygon) and not rest.is_empty:
+            region = rest
+    return region
 
 
 def _is_odd(faces: npt.NDArray[np.object_], way: FloatArray) -> npt.NDArray[np.bool_]:
