@@ -29,6 +29,7 @@ __all__ = [
     "Cell",
     "Certificate",
     "CertifyRequest",
+    "Conformance",
     "ContourRequest",
     "CriticalKind",
     "CriticalPoint",
@@ -88,6 +89,7 @@ class Method(enum.StrEnum):
 
     SPACE_FILLING_CURVE = "SpaceFillingCurve"
     TRANSECT = "Transect"
+    WATERSHED = "Watershed"
 
 
 class Draw(enum.StrEnum):
@@ -478,21 +480,15 @@ class Variogram(Message, frozen=True, kw_only=True, forbid_unknown_fields=True):
             raise InvalidMission(f"is {self.nugget!r}; expected less than the sill, {self.sill!r}", where="nugget")
 
 
-class CertifyRequest(Message, frozen=True, kw_only=True):
-    """A path to judge against the mission itself: the true outline and zones, not the planner's free space."""
+class Track(Message, frozen=True, kw_only=True):
+    """One vehicle's path, where it should start and end, and how fast it is travelled."""
 
-    outline: Polygon
-    zones: tuple[Polygon, ...] = ()
-    safety_m: float = 0.0
     path: LineString
     launch: Place
     recovery: Place
     speed_mps: float = 1.0
-    variogram: Variogram | None = None
 
     def __post_init__(self) -> None:
-        require_area(self, "outline")
-        require_finite(self, "safety_m", least=0.0)
         require_finite(self, "speed_mps", above=0.0)
         if not (0 < self.path.length < math.inf):
             raise InvalidMission(
@@ -500,15 +496,33 @@ class CertifyRequest(Message, frozen=True, kw_only=True):
             )
 
 
-class Measures(Message, frozen=True, kw_only=True):
-    """How good a path is against what is possible; the measures are defined in `docs/quality.md`.
+class CertifyRequest(Track, frozen=True, kw_only=True):
+    """A path to judge against the mission itself: the true outline and zones, not the planner's free space.
 
-    `cover_radius_m` are certified (low, high) bounds of the largest distance from a point of the free space to
-    the path (report, section 1.2.1, MinMax); `least_radius_m` is the least any path of that length could reach.
-    The kriging variances, shares of the sill, are there where a variogram is. `least_leg_distance_m` (MaxMin) is
-    None where no two legs are parallel, the discrepancy where the path keeps outside the free space; and all that
-    may be None is so in plans of earlier versions.
+    The paths of a team are judged together: `others` are those of its further vehicles. `areas` are what the paths
+    are to cover where that is not all of the free space: the hot spots of a treatment.
     """
+
+    outline: Polygon
+    zones: tuple[Polygon, ...] = ()
+    safety_m: float = 0.0
+    variogram: Variogram | None = None
+    others: tuple[Track, ...] = ()
+    areas: tuple[Polygon, ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_area(self, "outline")
+        require_finite(self, "safety_m", least=0.0)
+
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """Every path."""
+        return (self, *self.others)
+
+
+class Conformance(Message, frozen=True, kw_only=True):
+    """What there is of a path, and whether it keeps the rules; defined in `docs/quality.md`."""
 
     length_m: float
     duration_s: float
@@ -517,6 +531,21 @@ class Measures(Message, frozen=True, kw_only=True):
     crossings: int
     outside_m: float
     unsafe_m: float
+
+
+class Measures(Conformance, frozen=True, kw_only=True):
+    """How good a path is against what is possible; the measures are defined in `docs/quality.md`.
+
+    Of several paths, `duration_s` is that of the longest, figures of the rules are sums, and coverage is that of all
+    of them together.
+
+    `cover_radius_m` are certified (low, high) bounds of the largest distance from a point of the free space to
+    the path (report, section 1.2.1, MinMax); `least_radius_m` is the least any path of that length could reach.
+    The kriging variances, shares of the sill, are there where a variogram is. `least_leg_distance_m` (MaxMin) is
+    None where no two legs are parallel, the discrepancy where the path keeps outside the free space; and all that
+    may be None is so in plans of earlier versions.
+    """
+
     components: int
     free_area_m2: float
     judged_area: float
@@ -539,9 +568,13 @@ class Measures(Message, frozen=True, kw_only=True):
 
 
 class Certificate(Measures, frozen=True, kw_only=True):
-    """The measures of a path, and the place of the free space that is farthest from it."""
+    """The measures of a path, and the place of the free space that is farthest from it.
+
+    `tracks` are the figures of each path, where there are several.
+    """
 
     worst_gap: Place | None = None
+    tracks: tuple[Conformance, ...] = ()
 
 
 # --------------------------------------------------------------------------- DSS and guidance, in JSON

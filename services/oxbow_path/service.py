@@ -13,17 +13,19 @@ from oxbow.contracts import Method, PathPlan, PathRequest
 from oxbow.recording import Show
 from oxbow_path.conformance import require_conforming
 from oxbow_path.dropped import dropped_parts
-from oxbow_path.legs import Access
-from oxbow_path.planner import transects
 from oxbow_path.refinement import Polyline, smoothed
 from oxbow_path.ring import space_filling_curve
 from oxbow_path.task import Display, MethodPlan, PathMethod, Stop, Task, finest_spacing_m
+from oxbow_path.transect import transects
+from oxbow_path.walk.legs import Access
+from oxbow_path.watershed import watershed
 
 __all__ = ["METHODS", "handle"]
 
 METHODS: dict[Method, PathMethod] = {
     Method.SPACE_FILLING_CURVE: space_filling_curve,
     Method.TRANSECT: transects,
+    Method.WATERSHED: watershed,
 }
 
 ACCEPTED = 0.95

@@ -17,11 +17,12 @@ from oxbow.contracts import FloatArray, FreeSpace, PathRequest, SpacingStep, Wei
 from oxbow.errors import Infeasible
 from oxbow.recording import Layer, LayerKind, Show
 from oxbow.sweep import from_sweep, to_sweep
-from oxbow_path.legs import Passable, access
-from oxbow_path.probe import Probe
 from oxbow_path.refinement import RefinementStep, Samples
-from oxbow_path.routes import Routes
-from oxbow_path.transect import Waters
+from oxbow_path.walk.legs import Passable, access
+from oxbow_path.walk.probe import Probe
+from oxbow_path.walk.routes import Routes
+from oxbow_path.walk.spacing import Budget
+from oxbow_path.walk.trial import Waters
 
 __all__ = ["Display", "MethodPlan", "PathMethod", "Stop", "Task", "finest_spacing_m", "prepared_waters"]
 
@@ -32,6 +33,9 @@ STAGE = "path"
 
 LENGTH_USED = 0.999
 """Share of the longest length that a path may use: what is left covers the rounding of written positions."""
+
+ENOUGH = 0.97
+"""Share of the longest length that a path should use at least."""
 
 FINEST = 200
 """At most so many spacings make up the root of the water's area."""
@@ -97,6 +101,11 @@ class Task:
     def useful_length_m(self) -> float:
         """The length that is worth travelling: what the least spacing asks for, or the longest there may be."""
         return min(self.length_m, self.waters.free.area / self.spacing_m)
+
+    @property
+    def budget(self) -> Budget:
+        """The lengths and spacings that a pattern is fitted to."""
+        return Budget(self.length_m, ENOUGH * self.length_m, self.least_spacing_m)
 
     @cached_property
     def areas(self) -> tuple[WeightedArea, ...]:

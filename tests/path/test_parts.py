@@ -13,18 +13,19 @@ from shapely import LinearRing, LineString, Point, Polygon, box
 from oxbow.contracts import PathRequest
 from oxbow.errors import Internal
 from oxbow.reeb import cell_polygon
-from oxbow_path.circuit import plan_circuit
 from oxbow_path.conformance import require_conforming
-from oxbow_path.gaps import reach_gaps
-from oxbow_path.legs import Passable, access, joined
-from oxbow_path.planner import plan_transects
-from oxbow_path.probe import Probe, covered
-from oxbow_path.routes import Routes, taut
-from oxbow_path.spacing import Budget, fitted
 from oxbow_path.task import Task, prepared_waters
-from oxbow_path.transect import Pattern, Trial, try_pattern
-from oxbow_path.transects import place_transects
-from oxbow_path.walk import Brush, Walk, dilated, simply_connected
+from oxbow_path.transect.circuit import plan_circuit
+from oxbow_path.transect.pattern import try_transects
+from oxbow_path.transect.planner import plan_transects
+from oxbow_path.transect.transects import place_transects
+from oxbow_path.walk.gaps import reach_gaps
+from oxbow_path.walk.legs import Passable, access, joined
+from oxbow_path.walk.probe import Probe, covered
+from oxbow_path.walk.region import Brush, Walk, dilated, simply_connected
+from oxbow_path.walk.routes import Routes, taut
+from oxbow_path.walk.spacing import Budget, fitted
+from oxbow_path.walk.trial import Pattern, Trial
 
 quick = settings(deadline=None, max_examples=12, derandomize=True)
 
@@ -253,15 +254,15 @@ def test_the_remainder_is_spent_and_never_makes_a_gap_deeper():
     fitting = [trial for trial in plan.trials if trial.length_m <= 0.999 * asked.length_m]
     same = next(trial for trial in fitting if trial.pattern == plan.chosen.pattern)
     assert same.length_m <= plan.chosen.length_m <= asked.length_m
-    distances = plan.waters.probe.distances
+    distances = prepared_waters(asked, asked.space.free.area / asked.length_m).probe.distances
     assert distances(plan.chosen.path).max() <= distances(same.path).max()
 
 
 def test_a_pattern_is_built_the_same_whatever_was_built_before():
     waters = prepared_waters(request(lake(6)), 70.0)
-    first = try_pattern(waters, Pattern(90.0, 1.5, 0.25))
-    try_pattern(waters, Pattern(140.0, 1.3, 0.75))
-    assert try_pattern(waters, Pattern(90.0, 1.5, 0.25)).path == first.path
+    first = try_transects(waters, Pattern(90.0, 1.5, 0.25))
+    try_transects(waters, Pattern(140.0, 1.3, 0.75))
+    assert try_transects(waters, Pattern(90.0, 1.5, 0.25)).path == first.path
 
 
 @pytest.mark.parametrize(

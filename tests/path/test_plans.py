@@ -130,7 +130,7 @@ def test_least_spacing_binds_and_is_told():
 
 
 def test_a_length_that_small_water_cannot_use_is_told(monkeypatch):
-    monkeypatch.setattr("oxbow_path.planner.FINEST", 25)
+    monkeypatch.setattr("oxbow_path.task.FINEST", 25)
     water = box(0, 0, 30, 20)
     asked = request(water, spacings=5000)
     plan = handle(asked, discard)

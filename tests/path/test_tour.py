@@ -229,14 +229,23 @@ def test_the_outline_of_any_tour_is_one_ring_near_all_its_places(way, places):
 
 @quick
 @given(seed=st.integers(0, 10_000), count=st.integers(2, 40))
-def test_the_outline_of_a_random_tour_is_in_one_piece_and_inside(seed, count):
-    sites = low_discrepancy(HORSESHOE, count, seed=seed)
+def test_the_outline_of_a_tour_in_random_order_is_sound(seed, count):
     order = np.random.default_rng(seed).permutation(count)
-    way = Shore(HORSESHOE).geodesics(sites).way(order)
+    way = Shore(HORSESHOE).geodesics(low_discrepancy(HORSESHOE, count, seed=seed)).way(order)
     region = enclosed(way, HORSESHOE, 0.5)
     assert region.is_valid
     assert HORSESHOE.buffer(1e-6).covers(region)
-    assert region.buffer(1.0).covers(LineString(way))
+
+
+@pytest.mark.parametrize("name", ["comb", "spiral", "islands in a grid", "all but closed bay", "petals"])
+@quick
+@given(seed=st.integers(0, 10_000), count=st.integers(4, 60))
+def test_the_outline_of_a_tour_passes_all_of_it(name, seed, count):
+    water = NASTY[name]
+    geodesics = Shore(water).geodesics(low_discrepancy(water, count, seed=seed))
+    way = geodesics.way(shortened(first_tour(geodesics, 100.0), seed=0).order)
+    region = enclosed(way, water, 0.3)
+    assert region.buffer(0.6).covers(LineString(way))
 
 
 # --------------------------------------------------------------------------- paths

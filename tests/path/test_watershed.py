@@ -19,10 +19,10 @@ from oxbow.recording import Layer
 from oxbow.sweep import from_sweep
 from oxbow.testing import nasty_polygons
 from oxbow_path.conformance import require_conforming
-from oxbow_path.routes import Routes
-from oxbow_path.spacing import Budget
 from oxbow_path.task import Display, Task
-from oxbow_path.transect import Waters
+from oxbow_path.walk.routes import Routes
+from oxbow_path.walk.spacing import Budget
+from oxbow_path.walk.trial import Waters
 from oxbow_path.watershed import (
     CellPath,
     WatershedPlan,

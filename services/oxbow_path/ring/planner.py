@@ -7,11 +7,13 @@ from collections.abc import Iterator
 
 from oxbow.contracts import SpacingStep
 from oxbow.errors import Infeasible
-from oxbow_path.refinement import Guard, Polyline, refined, weights_at
+from oxbow_path.improvement import improved
+from oxbow_path.refinement import Guard, Polyline, weights_at
 from oxbow_path.ring.draws import drawn_places
 from oxbow_path.ring.kohonen import Epoch, Schedule, organised
 from oxbow_path.task import SHOWN_EVERY, Display, MethodPlan, Task
-from oxbow_path.transect import Pattern, Trial, try_pattern
+from oxbow_path.transect import try_transects
+from oxbow_path.walk.trial import Pattern, Trial
 
 __all__ = ["space_filling_curve"]
 
@@ -55,15 +57,7 @@ def space_filling_curve(task: Task, display: Display) -> MethodPlan:
         display.figures("ring", figures, step=number)
         if number % SHOWN_EVERY == 0:
             display.lines("ring", [ring.line], step=number, labels=(f"epoch {number}",))
-    path = refined(
-        ring,
-        task.waters.free,
-        task.samples,
-        length_m=task.useful_length_m,
-        spacing_m=task.spacing_m,
-        stop=task.stop,
-        watch=display.refinement,
-    )
+    path = improved(ring, task, display)
     if path.length > task.length_m:
         path = start.path
     steps.append(SpacingStep(spacing_m=task.spacing_m, length_m=path.length))
@@ -74,7 +68,7 @@ def _start(task: Task) -> Trial:
     """The walk over the circuit of the cells, as coarse as it must be to fit; at last without transects."""
     x0, y0, x1, y1 = task.waters.free.bounds
     for spacing_m in (*(factor * task.spacing_m for factor in START_SPACINGS), 2 * math.hypot(x1 - x0, y1 - y0)):
-        trial = try_pattern(task.waters, Pattern(spacing_m, REACH, PHASE))
+        trial = try_transects(task.waters, Pattern(spacing_m, REACH, PHASE))
         if trial.length_m <= task.length_m:
             return trial
     raise Infeasible(

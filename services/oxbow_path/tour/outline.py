@@ -17,7 +17,7 @@ import shapely
 from shapely import LineString, Point, Polygon
 
 from oxbow.contracts import FloatArray
-from oxbow_path.walk import largest
+from oxbow_path.walk.region import largest
 
 __all__ = ["enclosed"]
 

@@ -13,11 +13,6 @@ from shapely import LineString, Polygon
 
 from oxbow.contracts import FloatArray
 from oxbow.errors import Infeasible
-from oxbow_path.circuit import Circuit
-from oxbow_path.gaps import branch_to
-from oxbow_path.legs import ROUNDING_M
-from oxbow_path.remainder import with_remainder
-from oxbow_path.spacing import Budget
 from oxbow_path.task import Task
 from oxbow_path.tour.geodesic import Geodesics, Indices, Shore
 from oxbow_path.tour.local_search import shortened
@@ -27,8 +22,12 @@ from oxbow_path.tour.pyvrp_solver import is_installed, polished
 from oxbow_path.tour.sites import clustered, low_discrepancy, with_gaps
 from oxbow_path.tour.solver import Solution, Solver
 from oxbow_path.tour.start import first_tour
-from oxbow_path.transect import Pattern, Trial, Waters, finished
-from oxbow_path.walk import Brush, Walk, clear_of_land, simply_connected
+from oxbow_path.walk.gaps import branch_to
+from oxbow_path.walk.legs import ROUNDING_M
+from oxbow_path.walk.region import Brush, Circuit, Walk, clear_of_land, simply_connected
+from oxbow_path.walk.remainder import with_remainder
+from oxbow_path.walk.spacing import Budget
+from oxbow_path.walk.trial import Pattern, Trial, Waters, finished
 
 __all__ = ["TourPlan", "TourTrial", "plan_tour"]
 

@@ -12,29 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 
-from shapely import Polygon
-
-from oxbow.contracts import SpacingStep
-from oxbow.errors import Infeasible
-from oxbow_path.circuit import Circuit
-from oxbow_path.gaps import reach_gaps
-from oxbow_path.planner import ENOUGH, _score
-from oxbow_path.refinement import Polyline, refined
-from oxbow_path.remainder import with_remainder
-from oxbow_path.spacing import Budget, fitted
+from oxbow_path.improvement import improved, method_plan
+from oxbow_path.refinement import Polyline
 from oxbow_path.task import Display, MethodPlan, Task
-from oxbow_path.transect import (
-    STRAIGHTENING,
-    Pattern,
-    Trial,
-    Waters,
-    _accessible,
-    _started,
-    _straightened,
-    finished,
-    touches_entries,
-)
-from oxbow_path.walk import Brush, Walk, simply_connected
+from oxbow_path.walk.remainder import with_remainder
+from oxbow_path.walk.spacing import Budget, best_trial, fitted
+from oxbow_path.walk.trial import Pattern, Trial, Waters, walked
 from oxbow_path.watershed.contours import contour_tree
 
 __all__ = ["WatershedPlan", "plan_watershed", "try_contours", "watershed"]
@@ -60,27 +43,17 @@ def watershed(task: Task, display: Display) -> MethodPlan:
     Infeasible
         No path that was tried is short enough.
     """
-    plan = plan_watershed(task.waters, Budget(task.length_m, ENOUGH * task.length_m, task.least_spacing_m))
+    plan = plan_watershed(task.waters, task.budget)
     for step, trial in enumerate(plan.trials):
         display.lines("iterations", [trial.path], step=step, labels=(f"spacing {trial.pattern.spacing_m:.1f} m",))
-    chosen = plan.chosen
-    display.lines("contours", chosen.circuit.transects)
-    display.lines("links", chosen.circuit.links)
-    path = refined(
-        Polyline.of(chosen.path, task.waters.passable.free_and_rounding),
-        task.waters.free,
-        task.samples,
-        length_m=max(chosen.length_m, task.useful_length_m),
-        spacing_m=task.spacing_m,
-        stop=task.stop,
-        watch=display.refinement,
-    )
-    steps = tuple(SpacingStep(spacing_m=trial.pattern.spacing_m, length_m=trial.length_m) for trial in plan.trials)
-    return MethodPlan(path, chosen.pattern.spacing_m, chosen.pattern.reach_m, steps)
+    display.lines("contours", plan.chosen.circuit.transects)
+    display.lines("links", plan.chosen.circuit.links)
+    path = Polyline.of(plan.chosen.path, task.waters.passable.free_and_rounding)
+    return method_plan(improved(path, task, display), plan.chosen, plan.trials)
 
 
 def plan_watershed(waters: Waters, budget: Budget) -> WatershedPlan:
-    """Plan a Watershed path.
+    """The best of several reaches, each fitted to the length.
 
     Parameters
     ----------
@@ -96,18 +69,8 @@ def plan_watershed(waters: Waters, budget: Budget) -> WatershedPlan:
     """
     first_m = FIRST_SPACING * waters.spacing_m
     attempt = partial(try_contours, waters)
-    trials = [trial for reach in REACHES for trial in fitted(attempt, Pattern(first_m, reach, 0.0), budget)]
-    fitting = [trial for trial in trials if budget.fits(trial.length_m)]
-    if not fitting:
-        shortest_m = min(trial.length_m for trial in trials)
-        raise Infeasible(
-            f"is {budget.most_m:.0f} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
-            "Master_length",
-        )
-    chosen = min(fitting, key=lambda trial: _score(trial, waters, budget))
-    if chosen.pattern.spacing_m > budget.least_spacing_m:
-        chosen = with_remainder(chosen, waters, budget)
-    return WatershedPlan(chosen, tuple(trials))
+    trials = tuple(trial for reach in REACHES for trial in fitted(attempt, Pattern(first_m, reach, 0.0), budget))
+    return WatershedPlan(with_remainder(best_trial(trials, waters, budget), waters, budget), trials)
 
 
 def try_contours(waters: Waters, pattern: Pattern) -> Trial:
@@ -121,18 +84,4 @@ def try_contours(waters: Waters, pattern: Pattern) -> Trial:
         first_m=pattern.trim_m + pattern.half_width_m,
         spacing_m=2 * pattern.spacing_m,
     )
-    return _walked(waters, pattern, circuit)
-
-
-def _walked(waters: Waters, pattern: Pattern, circuit: Circuit) -> Trial:
-    brush = Brush(waters.free, pattern.half_width_m, pattern.trim_m)
-    connected = partial(
-        simply_connected, free=waters.free, probe=waters.probe, cut_width_m=pattern.cut_m, reach_m=pattern.reach_m
-    )
-    walk = connected(_accessible(_started(waters, circuit, brush), waters, brush))
-    walk = reach_gaps(walk, brush, waters.probe, waters.routes, reach_m=pattern.reach_m, cut_width_m=pattern.cut_m)
-    region = _straightened(walk.region, waters, STRAIGHTENING * pattern.spacing_m)
-    region = connected(_accessible(region, waters, brush)).region
-    if not touches_entries(region, waters):
-        region = Polygon(_accessible(region, waters, brush).exterior)
-    return finished(waters, pattern, circuit, Walk(region, walk.cuts, walk.enclosed))
+    return walked(waters, pattern, circuit)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from oxbow_path.transect import Pattern, Trial
+import numpy as np
 
-__all__ = ["Budget", "fitted"]
+from oxbow.errors import Infeasible
+from oxbow_path.walk.trial import Pattern, Trial, Waters
+
+__all__ = ["Budget", "best_trial", "fitted"]
 
 TURNS = 8
 """Trials for one pattern before the best so far is taken."""
@@ -69,3 +72,30 @@ def _next_spacing(trials: Sequence[Trial], budget: Budget) -> float:
         seen = (points[-2][1] - points[-1][1]) / (points[-1][0] - points[-2][0])
         sensitivity = min(max(seen, SENSITIVITY / 2), SENSITIVITY * 2)
     return math.exp(points[-1][0] + (points[-1][1] - target) / sensitivity)
+
+
+def best_trial(trials: Iterable[Trial], waters: Waters, budget: Budget) -> Trial:
+    """The trial that fits and leaves the least distance, the largest and the 95th percentile together.
+
+    A path much shorter than allowed is charged for what it leaves unused.
+
+    Raises
+    ------
+    Infeasible
+        None fits: even the shortest way from launch to recovery is longer than the vehicle can go.
+    """
+    trials = tuple(trials)
+    fitting = [trial for trial in trials if budget.fits(trial.length_m)]
+    if not fitting:
+        shortest_m = min(trial.length_m for trial in trials)
+        raise Infeasible(
+            f"allows {budget.most_m:.0f} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
+            "Master_length",
+        )
+
+    def score_m(trial: Trial) -> float:
+        distance_m = waters.probe.distances(trial.path)
+        unused = max(0.0, budget.enough_m / trial.length_m - 1.0)
+        return float(distance_m.max() + np.quantile(distance_m, 0.95)) * (1.0 + unused)
+
+    return min(fitting, key=score_m)

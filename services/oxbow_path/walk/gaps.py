@@ -11,9 +11,9 @@ from shapely import LineString, Point, Polygon
 from shapely.ops import substring
 
 from oxbow.contracts import FloatArray
-from oxbow_path.probe import Probe
-from oxbow_path.routes import Indices, Routes
-from oxbow_path.walk import Brush, Walk, largest, simply_connected
+from oxbow_path.walk.probe import Probe
+from oxbow_path.walk.region import Brush, Walk, largest, simply_connected
+from oxbow_path.walk.routes import Indices, Routes
 
 __all__ = ["branch_to", "reach_gaps"]
 

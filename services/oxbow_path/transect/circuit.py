@@ -20,20 +20,13 @@ import numpy as np
 from shapely import LineString
 
 from oxbow.contracts import Cell, FloatArray
-from oxbow_path.transects import Transect
+from oxbow_path.transect.transects import Transect
+from oxbow_path.walk.region import Circuit
 
-__all__ = ["Circuit", "plan_circuit"]
+__all__ = ["plan_circuit"]
 
 Node = tuple[str, int, int]
 """("transect", index, 0), or ("slot", cell, j): the part of a cell between its transects j - 1 and j."""
-
-
-@dataclass(frozen=True)
-class Circuit:
-    """The tree that the path walks round: trimmed transects, and the links that join them into one piece."""
-
-    transects: tuple[LineString, ...]
-    links: tuple[LineString, ...]
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from shapely import LineString, Point
 from shapely.ops import substring
 
 from oxbow.contracts import FloatArray
-from oxbow_path.gaps import branch_to
-from oxbow_path.spacing import Budget
-from oxbow_path.transect import Trial, Waters, finished, touches_entries
-from oxbow_path.walk import Brush, Walk, largest, simply_connected
+from oxbow_path.walk.gaps import branch_to
+from oxbow_path.walk.region import Brush, Walk, largest, simply_connected
+from oxbow_path.walk.spacing import Budget
+from oxbow_path.walk.trial import Trial, Waters, finished, touches_entries
 
 __all__ = ["with_remainder"]
 
@@ -28,7 +28,12 @@ SHORTENINGS = 4
 
 
 def with_remainder(trial: Trial, waters: Waters, budget: Budget) -> Trial:
-    """Add spurs to the worst gaps, one after another, while they fit the length and make no gap deeper."""
+    """Add spurs to the worst gaps, one after another, while they fit the length and make no gap deeper.
+
+    A trial at the least spacing that is wanted stays as it is.
+    """
+    if trial.pattern.spacing_m <= budget.least_spacing_m:
+        return trial
     for _ in range(SPURS):
         left_m = budget.most_m - trial.length_m
         longer = _with_spur(trial, waters, left_m) if left_m > LEAST_SHARE * budget.most_m else None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from oxbow_path.task import Display
 
 if TYPE_CHECKING:
-    from oxbow_path.planner import TransectPlan
+    from oxbow_path.transect.planner import TransectPlan
 
 __all__ = ["show_transects"]
 

@@ -20,8 +20,8 @@ from shapely.ops import substring
 
 from oxbow.contracts import FloatArray, Place
 from oxbow.errors import Infeasible, Internal
-from oxbow_path.routes import Routes, taut
-from oxbow_path.walk import largest
+from oxbow_path.walk.region import largest
+from oxbow_path.walk.routes import Routes, taut
 
 __all__ = ["ROUNDING_M", "Access", "Passable", "access", "is_plainly_simple", "joined"]
 

@@ -18,10 +18,9 @@ from shapely import LinearRing, LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray
-from oxbow_path.circuit import Circuit
-from oxbow_path.probe import Probe, covered
+from oxbow_path.walk.probe import Probe, covered
 
-__all__ = ["Brush", "Walk", "clear_of_land", "dilated", "largest", "simply_connected"]
+__all__ = ["Brush", "Circuit", "Walk", "clear_of_land", "dilated", "largest", "simply_connected"]
 
 CORE = 0.5
 """Half width of a band in narrows, as a share of its half width in the open."""
@@ -34,6 +33,14 @@ MITRE = 1.5
 
 NARROWINGS = 8
 AREA_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Circuit:
+    """The tree that the path walks round: transects, and the links that join them into one piece."""
+
+    transects: tuple[LineString, ...]
+    links: tuple[LineString, ...]
 
 
 @dataclass(frozen=True)

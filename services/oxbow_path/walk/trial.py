@@ -1,4 +1,4 @@
-"""The Transect method at one spacing: circuit, walk, gaps, legs (Rendas and Li 2016, section 1.2.1.1)."""
+"""A path for one pattern: the walk round a tree, its gaps, its legs (Rendas and Li 2016, section 1.2.1.1)."""
 
 from __future__ import annotations
 
@@ -10,18 +10,13 @@ import shapely
 from shapely import LineString, Point, Polygon
 
 from oxbow.contracts import Cell
-from oxbow_path.circuit import Circuit, plan_circuit
-from oxbow_path.gaps import branch_to, reach_gaps
-from oxbow_path.legs import ROUNDING_M, Access, Passable, is_plainly_simple, joined
-from oxbow_path.probe import Probe
-from oxbow_path.routes import Routes
-from oxbow_path.transects import place_transects
-from oxbow_path.walk import Brush, Walk, clear_of_land, dilated, largest, simply_connected
+from oxbow_path.walk.gaps import branch_to, reach_gaps
+from oxbow_path.walk.legs import ROUNDING_M, Access, Passable, is_plainly_simple, joined
+from oxbow_path.walk.probe import Probe
+from oxbow_path.walk.region import Brush, Circuit, Walk, clear_of_land, dilated, largest, simply_connected
+from oxbow_path.walk.routes import Routes
 
-__all__ = ["Pattern", "Trial", "Waters", "finished", "touches_entries", "try_pattern"]
-
-LEAST_TRANSECT = 2.0
-"""In spacings. Where the water is narrower, out and back along its middle is shorter than transects across."""
+__all__ = ["Pattern", "Trial", "Waters", "finished", "touches_entries", "walked"]
 
 TRIM = 0.8
 """Share of the tolerable distance to the shore that a transect stops short of it."""
@@ -103,23 +98,8 @@ class Trial:
         return float(self.path.length)
 
 
-def try_pattern(waters: Waters, pattern: Pattern) -> Trial:
-    """Build the path for one pattern.
-
-    The tree is made of transects two spacings apart, so that the legs on their two sides stand one spacing apart.
-    """
-    transects = place_transects(
-        waters.cells,
-        2 * pattern.spacing_m,
-        phase=pattern.phase,
-        min_length_m=LEAST_TRANSECT * pattern.spacing_m,
-    )
-    circuit = plan_circuit(
-        waters.cells,
-        transects,
-        trim_m=pattern.trim_m,
-        inset_m=pattern.half_width_m + pattern.trim_m,
-    )
+def walked(waters: Waters, pattern: Pattern, circuit: Circuit) -> Trial:
+    """Walk round a tree of lines, and round branches to what is out of reach of it; from launch to recovery."""
     brush = Brush(waters.free, pattern.half_width_m, pattern.trim_m)
     connected = partial(
         simply_connected, free=waters.free, probe=waters.probe, cut_width_m=pattern.cut_m, reach_m=pattern.reach_m

@@ -1,0 +1,34 @@
+"""How the methods end: refined, under what length there is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from shapely import LineString
+
+from oxbow.contracts import SpacingStep
+from oxbow_path.refinement import Polyline, refined
+from oxbow_path.task import Display, MethodPlan, Task
+from oxbow_path.walk.trial import Trial
+
+__all__ = ["improved", "method_plan"]
+
+
+def improved(path: Polyline, task: Task, display: Display) -> LineString:
+    """The path refined for the task; one already longer than is useful may stay as long."""
+    fits = path.length_m <= task.length_m
+    return refined(
+        path,
+        task.waters.free,
+        task.samples,
+        length_m=max(path.length_m, task.useful_length_m) if fits else task.useful_length_m,
+        spacing_m=task.spacing_m,
+        stop=task.stop,
+        watch=display.refinement,
+    )
+
+
+def method_plan(path: LineString, chosen: Trial, trials: Sequence[Trial]) -> MethodPlan:
+    """The plan of a method that fits a spacing: the path that the chosen trial became, and all trials."""
+    steps = tuple(SpacingStep(spacing_m=trial.pattern.spacing_m, length_m=trial.length_m) for trial in trials)
+    return MethodPlan(path, chosen.pattern.spacing_m, chosen.pattern.reach_m, steps)
