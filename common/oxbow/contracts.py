@@ -88,6 +88,7 @@ class Method(enum.StrEnum):
     """A way to generate a path; the names are the report's (Rendas and Li 2016, section 1.1)."""
 
     SPACE_FILLING_CURVE = "SpaceFillingCurve"
+    TOUR = "Tour"
     TRANSECT = "Transect"
     WATERSHED = "Watershed"
 
@@ -536,8 +537,8 @@ class Conformance(Message, frozen=True, kw_only=True):
 class Measures(Conformance, frozen=True, kw_only=True):
     """How good a path is against what is possible; the measures are defined in `docs/quality.md`.
 
-    Of several paths, `duration_s` is that of the longest, figures of the rules are sums, and coverage is that of all
-    of them together.
+    Of several paths, `duration_s` is that of the longest, figures of the rules are sums, and coverage is that of
+    all of them together.
 
     `cover_radius_m` are certified (low, high) bounds of the largest distance from a point of the free space to
     the path (report, section 1.2.1, MinMax); `least_radius_m` is the least any path of that length could reach.

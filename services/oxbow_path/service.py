@@ -16,6 +16,7 @@ from oxbow_path.dropped import dropped_parts
 from oxbow_path.refinement import Polyline, smoothed
 from oxbow_path.ring import space_filling_curve
 from oxbow_path.task import Display, MethodPlan, PathMethod, Stop, Task, finest_spacing_m
+from oxbow_path.tour import tour
 from oxbow_path.transect import transects
 from oxbow_path.walk.legs import Access
 from oxbow_path.watershed import watershed
@@ -24,6 +25,7 @@ __all__ = ["METHODS", "handle"]
 
 METHODS: dict[Method, PathMethod] = {
     Method.SPACE_FILLING_CURVE: space_filling_curve,
+    Method.TOUR: tour,
     Method.TRANSECT: transects,
     Method.WATERSHED: watershed,
 }

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 from scipy.sparse import coo_array, csr_array, vstack
-from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
+from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 from shapely import Polygon
 
@@ -31,6 +31,9 @@ SITES_IN_SIGHT = 12
 CORNERS_IN_SIGHT = 8
 """How many of the nearest corners of the shore a site or corner looks for."""
 
+TOUCH_M = 1e-6
+"""Lines that come so near to where rings touch do not pass it."""
+
 LEAST_STEP_M = 1e-9
 """A sparse matrix drops zeros."""
 
@@ -39,108 +42,41 @@ CHUNK = 256
 
 
 class Shore:
-    """The shore of a polygon of water: its triangulation, and which of its corners see each other nearby."""
+    """The shore of a polygon of water: its triangulation, and which of its corners see each other nearby.
+
+    Where rings touch one another, the water on either side has a corner of its own: no way leads through.
+    """
 
     def __init__(self, free: Polygon) -> None:
         shapely.prepare(free)
         self.free = free
         triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(free))
         vertices = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)
+        places, index = np.unique(vertices, axis=0, return_inverse=True)
         self._triangles = shapely.STRtree(triangles)
-        self._corners, index = np.unique(vertices, axis=0, return_inverse=True)
-        self._sides = index.reshape(-1, 3)
-        near = _in_sight(self._corners, _nearest(self._corners, self._corners, CORNERS_IN_SIGHT), free)
-        self._pairs = np.vstack([near, *(self._sides[:, [k, k - 1]] for k in range(3))])
+        self._sides = _fans(index.reshape(-1, 3))
+        self._corners = np.empty((self._sides.max() + 1, 2))
+        self._corners[self._sides.ravel()] = vertices
+        at = np.empty(len(self._corners), dtype=np.intp)
+        at[self._sides.ravel()] = index.ravel()
+        touches = np.bincount(at) > 1
+        self._touches = shapely.multipoints(places[touches])
+        self._open = np.flatnonzero(~touches[at])
+        near = self._open[_nearest(self._corners[self._open], self._corners[self._open], CORNERS_IN_SIGHT)]
+        around = [self._sides[:, [k, k - 1]] for k in range(3)]
+        self._pairs = np.vstack([self._in_sight(self._corners, near), *around])
 
     def geodesics(self, sites: FloatArray) -> Geodesics:
         """The ways between some sites, shape (n, 2), of the water."""
         n, places = len(sites), np.vstack([sites, self._corners])
         _, triangle = self._triangles.query_nearest(shapely.points(sites), all_matches=False)
         around = np.column_stack([np.repeat(np.arange(n), 3), n + self._sides[triangle].ravel()])
-        looks = [
-            _nearest(sites, sites, SITES_IN_SIGHT),
-            _nearest(sites, self._corners, CORNERS_IN_SIGHT) + np.array([0, n]),
-        ]
-        pairs = np.vstack([_in_sight(places, np.vstack(looks), self.free), around, n + self._pairs])
+        site, corner = _nearest(sites, self._corners[self._open], CORNERS_IN_SIGHT).T
+        looks = [_nearest(sites, sites, SITES_IN_SIGHT), np.column_stack([site, n + self._open[corner]])]
+        pairs = np.vstack([self._in_sight(places, np.vstack(looks)), around, n + self._pairs])
         return Geodesics(n, places, _graph(places, pairs))
 
-
-@dataclass(frozen=True)
-class Geodesics:
-    """Shortest ways between sites inside the water.
-
-    `places` are the sites, then the corners of the shore; `graph` holds the distances of places in sight.
-    """
-
-    count: int
-    places: FloatArray
-    graph: csr_array[np.float64]
-
-    def near(self, limit_m: float) -> csr_array[np.float64]:
-        """Distances of all pairs of sites no farther apart than the limit, shape (n, n)."""
-        rows = []
-        for first in range(0, self.count, CHUNK):
-            sources = np.arange(first, min(first + CHUNK, self.count))
-            distance = dijkstra(self.graph, indices=sources, limit=limit_m)[:, : self.count]
-            row, column = np.nonzero(np.isfinite(distance) & (distance > 0.0))
-            rows.append(coo_array((distance[row, column], (row, column)), shape=distance.shape))
-        return csr_array(vstack(rows))
-
-    def spanning_tree(self) -> csr_array[np.float64]:
-        """The least tree over all sites, shape (n, n), each leg one way.
-
-        Two sites that the tree joins have neighbouring cells in the graph's Voronoi diagram (Mehlhorn 1988): one
-        search from all sites finds it.
-        """
-        sites = np.arange(self.count)
-        distance, _, nearest = dijkstra(self.graph, indices=sites, min_only=True, return_predecessors=True)
-        steps = coo_array(self.graph)
-        a, b = nearest[steps.row], nearest[steps.col]
-        length = distance[steps.row] + steps.data + distance[steps.col]
-        shortest_first = np.lexsort((b, a, length))
-        shortest_first = shortest_first[a[shortest_first] < b[shortest_first]]
-        a, b, length = a[shortest_first], b[shortest_first], length[shortest_first]
-        _, first = np.unique(a.astype(np.int64) * self.count + b, return_index=True)
-        shape = (self.count, self.count)
-        return csr_array(minimum_spanning_tree(coo_array((length[first], (a[first], b[first])), shape=shape)))
-
-    def from_site(self, site: int) -> FloatArray:
-        """Distances from one site to all, shape (n,)."""
-        return np.asarray(dijkstra(self.graph, indices=np.array([site]))[0, : self.count])
-
-    def way(self, order: Sequence[int] | Indices) -> FloatArray:
-        """The closed way through the sites in that order, shape (m, 2), its end equal to its start."""
-        starts, goals = np.asarray(order), np.roll(order, -1)
-        seen = (np.asarray(self.graph[starts, goals]).ravel() > 0.0) | (starts == goals)
-        parts = []
-        for start, goal, straight in zip(starts.tolist(), goals.tolist(), seen.tolist(), strict=True):
-            parts.append([start] if straight else self._between(start, goal)[:-1])
-        parts.append([int(starts[0])])
-        return self.places[np.concatenate(parts).astype(np.intp)]
-
-    def _between(self, start: int, goal: int) -> list[int]:
-        _, previous = dijkstra(self.graph, indices=np.array([start]), return_predecessors=True)
-        nodes = [goal]
-        while nodes[-1] != start:
-            nodes.append(int(previous[0, nodes[-1]]))
-        return nodes[::-1]
-
-
-def _nearest(points: FloatArray, others: FloatArray, count: int) -> Indices:
-    """Pairs of every point with the others nearest to it, shape (m, 2)."""
-    count = min(count + 1, len(others))
-    _, nearest = cKDTree(others).query(points, k=np.arange(1, count + 1))
-    pairs = np.column_stack([np.repeat(np.arange(len(points)), count), nearest.ravel()])
-    apart = (points[pairs[:, 0]] != others[pairs[:, 1]]).any(axis=1)
-    return np.asarray(pairs[apart])
-
-
-def _in_sight(places: FloatArray, pairs: Indices, free: Polygon) -> Indices:
-    """Those pairs of places between which a straight line stays in the water."""
-    return np.asarray(pairs[shapely.covers(free, shapely.linestrings(places[pairs]))])
-
-
-def _graph(places: FloatArray, pairs: Indices) -> csr_array[np.float64]:
+    def _graph(places: FloatArray, pairs: Indices) -> csr_array[np.float64]:
     """The symmetric graph of some pairs, with the distances of their ends."""
     a, b = np.unique(np.sort(pairs, axis=1), axis=0).T
     weight = np.hypot(*(places[a] - places[b]).T) + LEAST_STEP_M
