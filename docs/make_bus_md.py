@@ -27,6 +27,7 @@ from oxbow.contracts import (
     Cell,
     Certificate,
     CertifyRequest,
+    Conformance,
     ContourRequest,
     CriticalKind,
     CriticalPoint,
@@ -43,6 +44,7 @@ from oxbow.contracts import (
     PathPlan,
     PathRequest,
     SpacingStep,
+    Track,
     Variogram,
     VariogramModel,
     WeightedArea,
@@ -194,7 +196,18 @@ EXAMPLES: dict[type[msgspec.Struct], msgspec.Struct] = {
     )
 }
 
-INNER = (DroppedPart, CriticalPoint, Cell, HeadingScore, WeightedArea, SpacingStep, Variogram, Layer)
+INNER = (
+    DroppedPart,
+    CriticalPoint,
+    Cell,
+    HeadingScore,
+    WeightedArea,
+    SpacingStep,
+    Variogram,
+    Track,
+    Conformance,
+    Layer,
+)
 """Messages that only occur inside others, and need no example of their own."""
 
 

@@ -10,7 +10,16 @@ import numpy as np
 import shapely
 from shapely import LineString
 
-from oxbow.contracts import Certificate, Decomposition, DroppedPart, FloatArray, FreeSpace, PathPlan, Place
+from oxbow.contracts import (
+    Certificate,
+    Decomposition,
+    DroppedPart,
+    FloatArray,
+    FreeSpace,
+    Measures,
+    PathPlan,
+    Place,
+)
 from oxbow.errors import Internal
 from oxbow.frame import Frame, Position, geodesic_length_m, lonlat
 from oxbow.mission import Mission
@@ -91,7 +100,8 @@ def _dropped(part: DroppedPart, frame: Frame) -> DroppedWater:
 
 def _in_degrees(certificate: Certificate, frame: Frame) -> PlanCertificate:
     gap = None if certificate.worst_gap is None else _position(certificate.worst_gap, frame)
-    return PlanCertificate(**msgspec.structs.asdict(certificate) | {"worst_gap": gap})
+    measures = {name: getattr(certificate, name) for name in Measures.__struct_fields__}
+    return PlanCertificate(**measures, worst_gap=gap)
 
 
 def _versions() -> dict[str, str]:

@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from shapely import LineString
+from shapely import LineString, MultiLineString
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray
 
-__all__ = ["long_side", "main_direction", "turned"]
+__all__ = ["Paths", "long_side", "main_direction", "segment_ends", "turned"]
+
+Paths = LineString | MultiLineString
+"""One vehicle's path, or those of several, one line each."""
 
 
-def main_direction(path: LineString) -> FloatArray:
-    """The direction (2,) that most of a path's length runs in: the mean of its doubled headings, halved."""
-    steps = np.diff(shapely.get_coordinates(path), axis=0)
+def segment_ends(paths: Paths) -> FloatArray:
+    """Both ends (n, 2, 2) of the segments of paths, in order, without those of no length."""
+    xy, path = shapely.get_coordinates(shapely.get_parts(paths), return_index=True)
+    ends = np.stack([xy[:-1], xy[1:]], axis=1)
+    return np.asarray(ends[(path[:-1] == path[1:]) & (ends[:, 0] != ends[:, 1]).any(axis=1)])
+
+
+def main_direction(paths: Paths) -> FloatArray:
+    """The direction (2,) that most of the length of paths runs in: the mean of doubled headings, halved."""
+    steps = np.diff(segment_ends(paths), axis=1)[:, 0]
     headings = np.arctan2(steps[:, 1], steps[:, 0])
     half = np.angle(np.sum(np.hypot(*steps.T) * np.exp(2j * headings))) / 2
     return np.array([np.cos(half), np.sin(half)])

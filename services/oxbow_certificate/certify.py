@@ -1,4 +1,4 @@
-"""The certificate of a path: every measure of it, from the mission's own water."""
+"""The certificate of one path or several: every measure of them, from the mission's own water."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import shapely
+from shapely import MultiLineString
 
-from oxbow.contracts import Certificate, CertifyRequest
+from oxbow.contracts import Certificate, CertifyRequest, Conformance, Track
+from oxbow_certificate.axes import Paths
 from oxbow_certificate.conformance import about_ends, count_crossings, outside_length, unsafe_length
 from oxbow_certificate.cover import CoverRadius, cover_radius, least_radius
 from oxbow_certificate.discrepancy import discrepancy
@@ -26,21 +28,23 @@ class Judgement:
     """A certificate and what it was computed from."""
 
     certificate: Certificate
+    paths: Paths
     space: JudgedSpace
     cover: CoverRadius
     spread: DistanceSpread
 
 
 def certify(request: CertifyRequest) -> Certificate:
-    """The certificate of a path; see `judge`."""
+    """The certificate of a path, or of several; see `judge`."""
     return judge(request).certificate
 
 
 def judge(request: CertifyRequest) -> Judgement:
-    """Measure a path against its mission and against the best that its length allows.
+    """Measure paths against their mission and against the best that their length allows.
 
-    A bad path is reported, not refused. A path that enters no part of the free space is judged
-    on all of it, with a `judged_area` of 0, so that every figure is finite.
+    A bad path is reported, not refused. Paths that enter no part of the free space are judged on all of it, with a
+    `judged_area` of 0, so that every figure is finite. Several paths cover together; each keeps the rules for
+    itself.
 
     Raises
     ------
@@ -48,39 +52,59 @@ def judge(request: CertifyRequest) -> Judgement:
         The zones or the safety distance leave no water to judge on.
     """
     space = JudgedSpace.of(request)
-    distance = PathDistance(request.path)
+    lines = [track.path for track in request.tracks]
+    paths = lines[0] if len(lines) == 1 else MultiLineString(lines)
+    distance = PathDistance(paths)
     cover = cover_radius(space.judged, distance)
     spread = distance_spread(space.judged, distance)
-    least_m = least_radius(space.judged.area, request.path.length)
+    least_m = least_radius(space.judged.area, paths.length, len(lines))
+    tracks = tuple(_conformance(track, space, request.safety_m) for track in request.tracks)
     certificate = Certificate(
-        **_conformance(request, space),
+        **_together(tracks),
+        **_water(space),
         **_coverage(cover, spread, least_m),
-        **_evenness(request, space, least_m),
-        **_kriging(request, spread, least_m),
+        **_evenness(request, paths, space, least_m),
+        **_kriging(request, paths, spread, least_m),
+        tracks=tracks if len(tracks) > 1 else (),
     )
-    return Judgement(certificate, space, cover, spread)
+    return Judgement(certificate, paths, space, cover, spread)
 
 
-def _conformance(request: CertifyRequest, space: JudgedSpace) -> dict[str, Any]:
-    """What there is of water and path, and whether the path keeps the rules."""
-    path, ends = request.path, (request.launch, request.recovery)
+def _conformance(track: Track, space: JudgedSpace, safety_m: float) -> Conformance:
+    path = track.path
     crossings = count_crossings(path)
+    return Conformance(
+        length_m=path.length,
+        duration_s=path.length / track.speed_mps,
+        waypoints=int(shapely.get_num_coordinates(path)),
+        is_simple=crossings == 0,
+        crossings=crossings,
+        outside_m=outside_length(path, space),
+        unsafe_m=unsafe_length(path, space, safety_m, (track.launch, track.recovery)),
+    )
+
+
+def _together(tracks: tuple[Conformance, ...]) -> dict[str, Any]:
+    """Sums of what is counted and measured along the paths; the mission lasts as long as its longest."""
+    sums = {
+        name: sum(getattr(track, name) for track in tracks)
+        for name in ("length_m", "waypoints", "crossings", "outside_m", "unsafe_m")
+    }
+    duration_s = max(track.duration_s for track in tracks)
+    return sums | {"duration_s": duration_s, "is_simple": all(track.is_simple for track in tracks)}
+
+
+def _water(space: JudgedSpace) -> dict[str, Any]:
+    """What there is of water."""
     return {
-        "length_m": path.length,
-        "duration_s": path.length / request.speed_mps,
-        "waypoints": int(shapely.get_num_coordinates(path)),
-        "is_simple": crossings == 0,
-        "crossings": crossings,
-        "outside_m": outside_length(path, space),
-        "unsafe_m": unsafe_length(path, space, request.safety_m, ends),
         "components": len(space.free.geoms),
-        "free_area_m2": space.free.area,
+        "free_area_m2": space.asked.area,
         "judged_area": space.judged_area,
     }
 
 
 def _coverage(cover: CoverRadius, spread: DistanceSpread, least_m: float) -> dict[str, Any]:
-    """How far the water is from the path."""
+    """How far the water is from the nearest path."""
     return {
         "cover_radius_m": (cover.low_m, cover.high_m),
         "least_radius_m": least_m,
@@ -95,23 +119,27 @@ def _coverage(cover: CoverRadius, spread: DistanceSpread, least_m: float) -> dic
     }
 
 
-def _evenness(request: CertifyRequest, space: JudgedSpace, least_m: float) -> dict[str, Any]:
-    """How evenly the path samples places and directions."""
-    path, spacing_m = request.path, 2.0 * least_m
-    ends = about_ends(space, (request.launch, request.recovery), max(2.0 * request.safety_m, spacing_m))
-    positions = discrepancy(space.judged, path, spacing_m, 2.0 * space.detail_m)
+def _evenness(request: CertifyRequest, paths: Paths, space: JudgedSpace, least_m: float) -> dict[str, Any]:
+    """How evenly the paths sample places and directions; legs are those of one vehicle."""
+    spacing_m = 2.0 * least_m
+    margin_m = max(2.0 * request.safety_m, spacing_m)
+    apart_m = [
+        least_leg_distance(track.path, spacing_m, about_ends(space, (track.launch, track.recovery), margin_m))
+        for track in request.tracks
+    ]
+    positions = discrepancy(space.judged, paths, spacing_m, 2.0 * space.detail_m)
     return {
-        "least_leg_distance_m": least_leg_distance(path, spacing_m, ends),
+        "least_leg_distance_m": min((least for least in apart_m if least is not None), default=None),
         "discrepancy": positions.value if positions else None,
         "discrepancy_ratio": positions.ratio if positions else None,
-        "directional_evenness": directional_evenness(path),
-        "turns": count_turns(path, least_m),
+        "directional_evenness": directional_evenness(paths),
+        "turns": sum(count_turns(track.path, least_m) for track in request.tracks),
     }
 
 
-def _kriging(request: CertifyRequest, spread: DistanceSpread, least_m: float) -> dict[str, Any]:
-    """How well the field could be told from what the path samples, where its variogram is known."""
+def _kriging(request: CertifyRequest, paths: Paths, spread: DistanceSpread, least_m: float) -> dict[str, Any]:
+    """How well the field could be told from what the paths sample, where its variogram is known."""
     if request.variogram is None:
         return {}
-    variance = kriging_variance(request.path, spread.places, request.variogram, least_m)
+    variance = kriging_variance(paths, spread.places, request.variogram, least_m)
     return {"kriging_variance_mean": variance.mean, "kriging_variance_max": variance.max}

@@ -36,14 +36,14 @@ class Farthest(NamedTuple):
     distance_m: float
 
 
-def least_radius(area_m2: float, length_m: float) -> float:
-    """Least cover radius that a path of a given length could reach over a given area, in metres.
+def least_radius(area_m2: float, length_m: float, paths: int = 1) -> float:
+    """Least cover radius that paths of a given length in all could reach over a given area, in metres.
 
-    The places within r of a connected curve of length L fill no more than 2 r L + pi r^2 (Hotelling 1939), and
-    they must fill the area. This is the positive root, in the form that loses no digits where L^2 is far above the
-    area.
+    The places within r of a connected curve of length L fill no more than 2 r L + pi r^2 (Hotelling 1939), those
+    of n curves of that length together no more than 2 r L + n pi r^2, and they must fill the area. This is the
+    positive root, in the form that loses no digits where L^2 is far above the area.
     """
-    return area_m2 / (length_m + math.sqrt(length_m**2 + math.pi * area_m2))
+    return area_m2 / (length_m + math.sqrt(length_m**2 + paths * math.pi * area_m2))
 
 
 def cover_radius(

@@ -1,4 +1,4 @@
-"""Discrepancy of the positions that a path samples: their distance from uniformity over a region."""
+"""Discrepancy of the positions that paths sample: their distance from uniformity over a region."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scipy.stats import qmc
 from shapely import LineString, MultiPolygon
 
 from oxbow.contracts import FloatArray
-from oxbow_certificate.axes import long_side, turned
+from oxbow_certificate.axes import Paths, long_side, turned
 
 __all__ = ["Discrepancy", "discrepancy", "unit_square"]
 
@@ -36,12 +36,10 @@ class Discrepancy:
     ratio: float
 
 
-def discrepancy(
-    region: MultiPolygon, path: LineString, spacing_m: float, tolerance_m: float
-) -> Discrepancy | None:
-    """Discrepancy of a path's positions in a region (Rendas and Li 2016, section 1.2.1, entropy/discrepancy).
+def discrepancy(region: MultiPolygon, paths: Paths, spacing_m: float, tolerance_m: float) -> Discrepancy | None:
+    """Discrepancy of the positions of paths in a region (Rendas and Li 2016, section 1.2.1, entropy/discrepancy).
 
-    There is a position on each `spacing_m` of the path, or on longer pieces where there would be more than 4 000.
+    There is a position on each `spacing_m` of a path, or on longer pieces where there would be more than 4 000.
     They are brought to the unit square by `unit_square`, along the long side of the region's least rectangle, and
     their centred discrepancy (Hickernell 1998) is taken there. It is the same for mirrored and swapped axes, so
     that it does not change where region and path are turned together.
@@ -56,7 +54,8 @@ def discrepancy(
     Discrepancy or None
         None where no position is in the region.
     """
-    positions = _positions(path, min(math.ceil(path.length / spacing_m), _MOST_POSITIONS))
+    piece_m = max(spacing_m, paths.length / _MOST_POSITIONS)
+    positions = np.concatenate([_positions(path, piece_m) for path in shapely.get_parts(paths)])
     shapely.prepare(region)
     positions = positions[shapely.dwithin(region, shapely.points(positions), tolerance_m)]
     along = long_side(region)
@@ -128,8 +127,9 @@ def _edges(region: MultiPolygon) -> _Edges:
     )
 
 
-def _positions(path: LineString, count: int) -> FloatArray:
-    """A position on each of `count` equal lengths of `path`, at offsets that fall into step with no legs."""
+def _positions(path: LineString, piece_m: float) -> FloatArray:
+    """A position on each of equal pieces of `path`, at offsets that fall into step with no legs."""
+    count = math.ceil(path.length / piece_m)
     xy = shapely.get_coordinates(path)
     at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
     wanted = (np.arange(count) + np.arange(count) / _GOLDEN_RATIO % 1.0) / count * at[-1]

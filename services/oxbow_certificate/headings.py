@@ -1,4 +1,4 @@
-"""The headings of a path: whether one direction is sampled more than others, and how often the vehicle turns."""
+"""The headings of paths: whether one direction is sampled more than others, and how often the vehicle turns."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-import shapely
 from shapely import LineString
 
 from oxbow.contracts import FloatArray
+from oxbow_certificate.axes import Paths, segment_ends
 
 __all__ = ["count_turns", "directional_evenness"]
 
@@ -17,15 +17,15 @@ TURN_RAD = math.radians(45.0)
 """The least change of heading that is a turn."""
 
 
-def directional_evenness(path: LineString) -> float:
-    """How evenly a path samples all directions: 0 for one direction, 1 for all alike.
+def directional_evenness(paths: Paths) -> float:
+    """How evenly paths sample all directions: 0 for one direction, 1 for all alike.
 
     Directions are headings without their sense, on a half circle, weighted by length. They are compared with
     the uniform distribution by Watson's U^2 (Watson 1961), which does not depend on where the circle is cut: the
     variance of the difference of the two distribution functions. It is 1/12 for one direction, and the figure is
     1 - sqrt(12 U^2): for k directions sampled alike, evenly apart, 1 - 1/k.
     """
-    steps = _steps(path)
+    steps = _steps(paths)
     length = np.hypot(*steps.T)
     turned = np.arctan2(steps[:, 1], steps[:, 0]) / math.pi % 1.0
     order = np.argsort(turned)
@@ -69,7 +69,6 @@ def _range_minimum(values: FloatArray, first: npt.NDArray[np.intp], last: npt.ND
     return least
 
 
-def _steps(path: LineString) -> FloatArray:
+def _steps(paths: Paths) -> FloatArray:
     """The ways (n, 2) from each waypoint to the next, without those of no length."""
-    steps = np.diff(shapely.get_coordinates(path), axis=0)
-    return np.asarray(steps[steps.any(axis=1)])
+    return np.diff(segment_ends(paths), axis=1)[:, 0]

@@ -19,6 +19,7 @@ from scipy.spatial import KDTree
 from shapely import LineString
 
 from oxbow.contracts import FloatArray, Variogram, VariogramModel
+from oxbow_certificate.axes import Paths
 
 __all__ = ["KrigingVariance", "correlation", "kriging_variance", "local_variance", "sampled", "sampling_pitch"]
 
@@ -53,32 +54,33 @@ class KrigingVariance:
 
 
 def kriging_variance(
-    path: LineString, places: FloatArray, variogram: Variogram, least_radius_m: float
+    paths: Paths, places: FloatArray, variogram: Variogram, least_radius_m: float
 ) -> KrigingVariance:
-    """The kriging variance of a field sampled along a path.
+    """The kriging variance of a field sampled along paths.
 
     Parameters
     ----------
-    path
+    paths
         Where the field is sampled.
     places : ndarray of shape (n, 2)
         Where it is reconstructed: places spread evenly over a region.
     variogram
         How it varies.
     least_radius_m
-        The least cover radius that a path of this length could have over the region.
+        The least cover radius that paths of this length could have over the region.
     """
-    samples = sampled(path, sampling_pitch(variogram, path, least_radius_m))
+    pitch_m = sampling_pitch(variogram, paths, least_radius_m)
+    samples = np.concatenate([sampled(path, pitch_m) for path in shapely.get_parts(paths)])
     variances = local_variance(samples, places, variogram)
     return KrigingVariance(mean=float(variances.mean()), max=float(variances.max()))
 
 
-def sampling_pitch(variogram: Variogram, path: LineString, least_radius_m: float) -> float:
-    """How far apart to sample a path, in metres: finely against the range, and as finely along legs as across.
+def sampling_pitch(variogram: Variogram, paths: Paths, least_radius_m: float) -> float:
+    """How far apart to sample paths, in metres: finely against the range, and as finely along legs as across.
 
     Vehicles sample more often; their further samples would change little, and only for the better.
     """
-    return max(min(PITCH * variogram.range_m, least_radius_m), path.length / MOST_SAMPLES)
+    return max(min(PITCH * variogram.range_m, least_radius_m), paths.length / MOST_SAMPLES)
 
 
 def sampled(path: LineString, pitch_m: float) -> FloatArray:

@@ -1,11 +1,11 @@
-"""The water that a path is judged on: the mission's own, not the planner's simplified one."""
+"""The water that paths are judged on: the mission's own, not the planner's simplified one."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import shapely
-from shapely import MultiPolygon, Polygon
+from shapely import MultiLineString, MultiPolygon, Polygon
 
 from oxbow.contracts import CertifyRequest
 from oxbow.errors import Infeasible
@@ -28,16 +28,19 @@ class JudgedSpace:
         The outline less the forbidden zones.
     free
         The water eroded by the safety distance: its connected parts.
+    asked
+        What is to be covered: all of `free`, or those of the request's areas that lie in it.
     judged
-        The parts of `free` that the path enters; all of them where it enters none.
+        The parts of `asked` that a path enters; all of them where none is entered.
     judged_area
-        The share of the free area that the path enters, 0 to 1.
+        The share of the asked area that is entered, 0 to 1.
     detail_m
         Detail of the shore finer than this is not followed in `free`.
     """
 
     water: Polygon | MultiPolygon
     free: MultiPolygon
+    asked: MultiPolygon
     judged: MultiPolygon
     judged_area: float
     detail_m: float
@@ -49,7 +52,7 @@ class JudgedSpace:
         Raises
         ------
         Infeasible
-            The zones or the safety distance leave no water.
+            The zones or the safety distance leave no water, or none of what is to be covered.
         """
         water = MultiPolygon(polygons(request.outline.difference(shapely.union_all(request.zones))))
         if water.is_empty:
@@ -62,14 +65,30 @@ class JudgedSpace:
                 where="safety_m",
             )
         free = MultiPolygon(parts)
-        entered = [part for part in parts if part.intersects(request.path)]
+        asked = _asked(free, request)
+        paths = MultiLineString([track.path for track in request.tracks])
+        entered = [part for part in asked.geoms if part.intersects(paths)]
         entered_area = sum(part.area for part in entered)
-        return cls(water, free, MultiPolygon(entered or parts), entered_area / free.area, detail_m)
+        return cls(water, free, asked, MultiPolygon(entered or asked), entered_area / asked.area, detail_m)
+
+
+def _asked(free: MultiPolygon, request: CertifyRequest) -> MultiPolygon:
+    if not request.areas:
+        return free
+    asked = polygons(shapely.union_all(request.areas).intersection(free))
+    if not asked:
+        raise Infeasible(
+            f"lie nowhere farther from the shore than Safety, {request.safety_m:g} m; expected some water that a"
+            " vehicle may enter",
+            where="areas",
+        )
+    return MultiPolygon(asked)
 
 
 def _detail(water: MultiPolygon, request: CertifyRequest) -> float:
     """Tolerance that moves area, distances and erosion by at most a thousandth: a million vertices need one."""
-    scales = [water.area / water.length, least_radius(water.area, request.path.length)]
+    length_m = sum(track.path.length for track in request.tracks)
+    scales = [water.area / water.length, least_radius(water.area, length_m)]
     if request.safety_m:
         scales.append(request.safety_m)
     return DETAIL_SHARE * min(scales)

@@ -1,4 +1,4 @@
-"""The stage `certificate`: judges a path and shows where it leaves gaps."""
+"""The stage `certificate`: judges paths and shows where they leave gaps."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ EVENNESS = ("least_leg_distance_m", "discrepancy_ratio", "directional_evenness")
 
 
 def handle(request: CertifyRequest, show: Show) -> Certificate:
-    """Certify a request's path, and show the path, its gaps, the worst of them and the figures.
+    """Certify a request's paths, and show them, their gaps, the worst of them and the figures.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def handle(request: CertifyRequest, show: Show) -> Certificate:
         The zones or the safety distance leave no water to judge on.
     """
     judgement = judge(request)
-    show(Layer(stage=STAGE, name="path", geometries=(request.path,)))
+    show(Layer(stage=STAGE, name="path", geometries=tuple(track.path for track in request.tracks)))
     show(_gaps(judgement))
     show(_worst_gap(judgement))
     figures = {name: getattr(judgement.certificate, name) for name in RULES + COVERAGE + EVENNESS}
@@ -40,7 +40,7 @@ def handle(request: CertifyRequest, show: Show) -> Certificate:
 
 
 def _gaps(judgement: Judgement) -> Layer:
-    """Sampled places that lie far from the path, coloured by their distance as a share of the largest."""
+    """Sampled places that lie far from every path, coloured by their distance as a share of the largest."""
     spread = judgement.spread
     far = spread.distance_m > GAP_RATIO * judgement.certificate.least_radius_m
     return Layer(

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 
-import msgspec
 import numpy as np
 from shapely import LineString
 
-from oxbow.contracts import Certificate, CertifyRequest
+from oxbow.contracts import Certificate, CertifyRequest, Measures
 from oxbow.errors import InvalidMission
 from oxbow.frame import Frame, Position, geodesic_length_m, lonlat
 from oxbow.mission import Mission
@@ -70,7 +69,7 @@ def evaluate(mission: Mission) -> Evaluation:
     request = certify_request(mission, site)
     certificate = certify(request)
     length_m = geodesic_length_m(lonlat(mission.master_path or ()))
-    measures = msgspec.structs.asdict(certificate) | {
+    measures = {name: getattr(certificate, name) for name in Measures.__struct_fields__} | {
         "length_m": length_m,
         "duration_s": length_m / mission.master_speed_mps,
         "worst_gap": _worst_gap(certificate, site.frame),

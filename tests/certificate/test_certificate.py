@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon, affinity, box
 
-from oxbow.contracts import Certificate, CertifyRequest
+from oxbow.contracts import Certificate, CertifyRequest, Track
 from oxbow.errors import Infeasible
 from oxbow.mission import mission_json, read_mission
 from oxbow.pipeline import plan_mission
@@ -198,3 +198,59 @@ def test_agrees_with_the_independent_judge(name):
         assert own.unsafe_m == pytest.approx(judged["unsafe_m"], abs=0.01)
         for measure in ("length_m", "free_area_m2", "q", "mean_distance_m", "p95_distance_m", "judged_area"):
             assert getattr(own, measure) == pytest.approx(judged[measure], rel=0.01), measure
+
+
+def rows(heights, west=5.0, east=95.0) -> LineString:
+    return LineString([(x, y) for k, y in enumerate(heights) for x in ((west, east), (east, west))[k % 2]])
+
+
+def track(line: LineString, **changes) -> Track:
+    fields = {"launch": line.coords[0], "recovery": line.coords[-1]} | changes
+    return Track(path=line, **fields)
+
+
+def test_the_paths_of_a_team_cover_together_and_keep_the_rules_each_for_itself():
+    south, north = rows((10, 20, 30, 40)), rows((60, 70, 80, 90))
+    alone = certified(south)
+    both = certified(south, others=(track(north, speed_mps=0.5),))
+    assert alone.tracks == ()
+    assert both.cover_radius_m[1] < alone.cover_radius_m[0] / 2
+    assert both.q == pytest.approx(both.cover_radius_m[1] / least_radius(1e4, both.length_m, 2))
+    assert [one.length_m for one in both.tracks] == pytest.approx([south.length, north.length])
+    assert both.length_m == pytest.approx(south.length + north.length)
+    assert both.duration_s == pytest.approx(north.length / 0.5)
+    assert both.is_simple
+
+
+def test_paths_that_meet_are_simple_but_one_outside_is_told():
+    crossing = track(LineString([(50, 5), (50, 130)]))
+    judged = certified(rows((10, 20, 30, 40)), others=(crossing,))
+    assert judged.is_simple
+    assert judged.outside_m == pytest.approx(30, abs=0.1)
+    assert [one.outside_m for one in judged.tracks] == pytest.approx([0, 30], abs=0.1)
+
+
+def test_each_vehicles_own_legs_are_excused():
+    ashore = LineString([(50, -5), (50, 50)])
+    own = certified([(20, 20), (80, 20)], safety_m=5.0, others=(track(ashore),))
+    others = certified([(20, 20), (80, 20)], safety_m=5.0, others=(track(ashore, launch=(50, 50)),))
+    assert own.unsafe_m == 0
+    assert others.unsafe_m == pytest.approx(9.95, abs=0.1)
+
+
+@given(count=st.integers(1, 6), length_m=st.floats(10, 1e6), area_m2=st.floats(1, 1e9))
+@quick
+def test_the_least_radius_fills_the_area_with_the_bands_of_all_curves(count, length_m, area_m2):
+    radius_m = least_radius(area_m2, length_m, count)
+    assert 2 * radius_m * length_m + count * math.pi * radius_m**2 == pytest.approx(area_m2)
+
+
+def test_hot_spots_are_judged_in_place_of_the_whole_water():
+    spots = (box(10, 10, 30, 30), box(60, 60, 90, 90))
+    passes = rows((12.5, 17.5, 22.5, 27.5), 12.5, 27.5)
+    judged = certified(passes, areas=spots)
+    assert judged.free_area_m2 == pytest.approx(400 + 900)
+    assert judged.judged_area == pytest.approx(400 / 1300)
+    assert judged.cover_radius_m[1] < 4
+    with pytest.raises(Infeasible, match="Safety"):
+        certified(passes, safety_m=12.0, areas=(box(0, 0, 9, 9),))
