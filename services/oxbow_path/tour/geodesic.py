@@ -32,7 +32,7 @@ CORNERS_IN_SIGHT = 8
 """How many of the nearest corners of the shore a site or corner looks for."""
 
 TOUCH_M = 1e-6
-"""Lines that come so near to where rings touch do not pass it."""
+"""A line that comes so near to where rings touch does not pass there."""
 
 LEAST_STEP_M = 1e-9
 """A sparse matrix drops zeros."""
@@ -52,17 +52,16 @@ class Shore:
         self.free = free
         triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(free))
         vertices = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)
-        places, index = np.unique(vertices, axis=0, return_inverse=True)
+        places, vertex = np.unique(vertices, axis=0, return_inverse=True)
         self._triangles = shapely.STRtree(triangles)
-        self._sides = _fans(index.reshape(-1, 3))
-        self._corners = np.empty((self._sides.max() + 1, 2))
-        self._corners[self._sides.ravel()] = vertices
-        at = np.empty(len(self._corners), dtype=np.intp)
-        at[self._sides.ravel()] = index.ravel()
-        touches = np.bincount(at) > 1
+        self._sides = _fans(vertex.reshape(-1, 3))
+        _, first = np.unique(self._sides, return_index=True)
+        self._corners = vertices[first]
+        touches = np.bincount(vertex[first], minlength=len(places)) > 1
         self._touches = shapely.multipoints(places[touches])
-        self._open = np.flatnonzero(~touches[at])
-        near = self._open[_nearest(self._corners[self._open], self._corners[self._open], CORNERS_IN_SIGHT)]
+        self._plain = np.flatnonzero(~touches[vertex[first]])
+        plain = self._corners[self._plain]
+        near = self._plain[_nearest(plain, plain, CORNERS_IN_SIGHT)]
         around = [self._sides[:, [k, k - 1]] for k in range(3)]
         self._pairs = np.vstack([self._in_sight(self._corners, near), *around])
 
@@ -71,15 +70,111 @@ class Shore:
         n, places = len(sites), np.vstack([sites, self._corners])
         _, triangle = self._triangles.query_nearest(shapely.points(sites), all_matches=False)
         around = np.column_stack([np.repeat(np.arange(n), 3), n + self._sides[triangle].ravel()])
-        site, corner = _nearest(sites, self._corners[self._open], CORNERS_IN_SIGHT).T
-        looks = [_nearest(sites, sites, SITES_IN_SIGHT), np.column_stack([site, n + self._open[corner]])]
+        site, corner = _nearest(sites, self._corners[self._plain], CORNERS_IN_SIGHT).T
+        looks = [_nearest(sites, sites, SITES_IN_SIGHT), np.column_stack([site, n + self._plain[corner]])]
         pairs = np.vstack([self._in_sight(places, np.vstack(looks)), around, n + self._pairs])
         return Geodesics(n, places, _graph(places, pairs))
 
-    def _graph(places: FloatArray, pairs: Indices) -> csr_array[np.float64]:
+    def _in_sight(self, places: FloatArray, pairs: Indices) -> Indices:
+        """Those pairs of places between which a straight line stays in the water, and passes no touch."""
+        lines = shapely.linestrings(places[pairs])
+        seen = shapely.covers(self.free, lines) & ~shapely.dwithin(lines, self._touches, TOUCH_M)
+        return np.asarray(pairs[seen])
+
+
+@dataclass(frozen=True)
+class Geodesics:
+    """Shortest ways between sites inside the water.
+
+    `places` are the sites, then the corners of the shore; `graph` holds the distances of places in sight.
+    """
+
+    count: int
+    places: FloatArray
+    graph: csr_array[np.float64]
+
+    def near(self, limit_m: float) -> csr_array[np.float64]:
+        """Distances of all pairs of sites no farther apart than the limit, shape (n, n)."""
+        rows = []
+        for first in range(0, self.count, CHUNK):
+            sources = np.arange(first, min(first + CHUNK, self.count))
+            distance = dijkstra(self.graph, indices=sources, limit=limit_m)[:, : self.count]
+            row, column = np.nonzero(np.isfinite(distance) & (distance > 0.0))
+            rows.append(coo_array((distance[row, column], (row, column)), shape=distance.shape))
+        return csr_array(vstack(rows))
+
+    def spanning_tree(self) -> csr_array[np.float64]:
+        """The least tree over all sites, shape (n, n), each leg one way.
+
+        Two sites that the tree joins have neighbouring cells in the graph's Voronoi diagram (Mehlhorn 1988): one
+        search from all sites finds it.
+        """
+        sites = np.arange(self.count)
+        distance, _, nearest = dijkstra(self.graph, indices=sites, min_only=True, return_predecessors=True)
+        steps = coo_array(self.graph)
+        a, b = nearest[steps.row], nearest[steps.col]
+        length = distance[steps.row] + steps.data + distance[steps.col]
+        shortest_first = np.lexsort((b, a, length))
+        shortest_first = shortest_first[a[shortest_first] < b[shortest_first]]
+        a, b, length = a[shortest_first], b[shortest_first], length[shortest_first]
+        _, first = np.unique(a.astype(np.int64) * self.count + b, return_index=True)
+        shape = (self.count, self.count)
+        return csr_array(minimum_spanning_tree(coo_array((length[first], (a[first], b[first])), shape=shape)))
+
+    def from_site(self, site: int) -> FloatArray:
+        """Distances from one site to all, shape (n,)."""
+        return np.asarray(dijkstra(self.graph, indices=np.array([site]))[0, : self.count])
+
+    def way(self, order: Sequence[int] | Indices) -> FloatArray:
+        """The closed way through the sites in that order, shape (m, 2), its end equal to its start."""
+        starts, goals = np.asarray(order), np.roll(order, -1)
+        seen = (np.asarray(self.graph[starts, goals]).ravel() > 0.0) | (starts == goals)
+        parts = []
+        for start, goal, straight in zip(starts.tolist(), goals.tolist(), seen.tolist(), strict=True):
+            parts.append([start] if straight else self._between(start, goal)[:-1])
+        parts.append([int(starts[0])])
+        return self.places[np.concatenate(parts).astype(np.intp)]
+
+    def _between(self, start: int, goal: int) -> list[int]:
+        _, previous = dijkstra(self.graph, indices=np.array([start]), return_predecessors=True)
+        nodes = [goal]
+        while nodes[-1] != start:
+            nodes.append(int(previous[0, nodes[-1]]))
+        return nodes[::-1]
+
+
+def _nearest(points: FloatArray, others: FloatArray, count: int) -> Indices:
+    """Pairs of every point with the others nearest to it, shape (m, 2)."""
+    count = min(count + 1, len(others))
+    _, nearest = cKDTree(others).query(points, k=np.arange(1, count + 1))
+    pairs = np.column_stack([np.repeat(np.arange(len(points)), count), nearest.ravel()])
+    apart = (points[pairs[:, 0]] != others[pairs[:, 1]]).any(axis=1)
+    return np.asarray(pairs[apart])
+
+
+def _graph(places: FloatArray, pairs: Indices) -> csr_array[np.float64]:
     """The symmetric graph of some pairs, with the distances of their ends."""
     a, b = np.unique(np.sort(pairs, axis=1), axis=0).T
     weight = np.hypot(*(places[a] - places[b]).T) + LEAST_STEP_M
     both = (np.concatenate([a, b]), np.concatenate([b, a]))
     n = len(places)
     return csr_array(coo_array((np.concatenate([weight, weight]), both), shape=(n, n)))
+
+
+def _fans(triangles: Indices) -> Indices:
+    """Number the corners of triangles, shape (n, 3), that are given by their vertices.
+
+    Two triangles have a corner in common where a side that they have in common ends in it.
+    """
+    copies = np.arange(triangles.size).reshape(-1, 3)
+    ends, at = (
+        np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2) for corners in (triangles, copies)
+    )
+    upward = np.argsort(ends, axis=1)
+    ends, at = np.take_along_axis(ends, upward, axis=1), np.take_along_axis(at, upward, axis=1)
+    order = np.lexsort(ends.T)
+    common = np.flatnonzero((ends[order[1:]] == ends[order[:-1]]).all(axis=1))
+    a, b = at[order[common]].ravel(), at[order[common + 1]].ravel()
+    links = coo_array((np.ones(len(a)), (a, b)), shape=(triangles.size, triangles.size))
+    _, corner = connected_components(links, directed=False)
+    return np.asarray(corner, dtype=np.intp).reshape(-1, 3)
