@@ -113,7 +113,7 @@ def access(place: Place, free: Polygon, water: Routes, *, where: str) -> Access:
     if route is None:
         raise Infeasible(f"no way through the water leads from {place} to the free space", where)
     clearance_m = shapely.distance(Point(straight.coords[-1]), water.water.boundary) / 2
-    around = water.water.intersection(box(*route.buffer(5 * clearance_m).bounds))
+    around = water.water.intersection(box(*route.bounds).buffer(5 * clearance_m))
     roomy = around.buffer(-clearance_m).union(point.buffer(4 * clearance_m).intersection(around))
     return _in_water(shapely.get_parts(taut(route, roomy).difference(free))[0], water.water)
 
