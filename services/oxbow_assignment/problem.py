@@ -10,9 +10,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from oxbow.contracts import FloatArray
+from oxbow.contracts import FloatArray, Role, Vehicle
 from oxbow.errors import InvalidMission
-from oxbow.contracts import Role, Vehicle
 
 __all__ = ["ROUNDING", "BoolArray", "IntArray", "Objective", "Problem", "require_distances"]
 

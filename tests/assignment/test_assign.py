@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import problem, random_problem, require_sound, vehicle
 
+from oxbow.contracts import Role, Vehicle
 from oxbow.errors import InvalidMission, Unavailable
 from oxbow_assignment import joint
 from oxbow_assignment.assign import Clustering, ClusterMethod, assign
 from oxbow_assignment.assignment import assignment_of
 from oxbow_assignment.clustering import k_means
-from oxbow.contracts import Role, Vehicle
 from oxbow_assignment.matching import match
 from oxbow_assignment.problem import Objective, Problem
 from oxbow_assignment.pseudo_coordinates import pseudo_coordinates

@@ -1,0 +1,121 @@
+"""The slaves at sea: where each enters and leaves the free space, and how far treatments lie from there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from msgspec import structs
+from shapely import LineString, Point, Polygon
+
+from oxbow.contracts import FloatArray, Vehicle
+from oxbow.errors import Infeasible, InvalidMission
+from oxbow.route import Router
+
+__all__ = ["Fleet", "Ways"]
+
+MARGIN = 1e-9
+"""Share of each range that is kept back for rounding."""
+
+
+@dataclass(frozen=True)
+class Ways:
+    """Metres along the shortest routes from and to the ends of n lines.
+
+    Parameters
+    ----------
+    starts, recoveries : ndarray of shape (v, n, 2)
+        From each slave's start, and to its recovery, over its leg ashore if it has one, to both ends of each line.
+    between : ndarray of shape (n, n, 2, 2)
+        From one line's ends to another's.
+    lengths_m : ndarray of shape (n,)
+        The lines' own lengths.
+    """
+
+    starts: FloatArray
+    recoveries: FloatArray
+    between: FloatArray
+    lengths_m: FloatArray
+
+    @cached_property
+    def access_m(self) -> FloatArray:
+        """What it takes each slave to get to each line and home, either way round on average, shape (v, n)."""
+        return np.asarray(self.starts.mean(axis=2) + self.recoveries.mean(axis=2))
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """Slaves, and where they enter and leave the free space.
+
+    Parameters
+    ----------
+    slaves
+        At least one.
+    free
+        Where they may go; prepared.
+    router
+        Finds the shortest routes through it.
+    out, home
+        A leg for each slave: from its start straight to the nearest place of the free space, and from there to its
+        recovery; of no length where the point lies in the free space.
+    """
+
+    slaves: tuple[Vehicle, ...]
+    free: Polygon
+    router: Router
+    out: tuple[LineString, ...]
+    home: tuple[LineString, ...]
+
+    @classmethod
+    def of(cls, slaves: Sequence[Vehicle], free: Polygon, router: Router) -> Fleet:
+        """The slaves and their legs.
+
+        Raises
+        ------
+        InvalidMission
+            There is no slave.
+        Infeasible
+            A slave's range does not suffice to reach the free space and go home.
+        """
+        if not slaves:
+            raise InvalidMission("has no slave; expected one or more to treat the hot spots", where="vehicles")
+        out = tuple(shapely.shortest_line(Point(slave.start), free) for slave in slaves)
+        home = tuple(shapely.shortest_line(free, Point(slave.recovery)) for slave in slaves)
+        for slave, leg, back in zip(slaves, out, home, strict=True):
+            if leg.length + back.length >= slave.length_m:
+                raise Infeasible(
+                    f"lies {leg.length:.0f} m outside the free space, and the recovery {back.length:.0f} m;"
+                    f" expected less than the vehicle's {slave.length_m:.0f} m in all",
+                    where=f"vehicle {slave.name!r}: start",
+                )
+        return cls(tuple(slaves), free, router, out, home)
+
+    @cached_property
+    def cautious_slaves(self) -> tuple[Vehicle, ...]:
+        """The slaves, with a little less range."""
+        return tuple(structs.replace(slave, length_m=slave.length_m * (1.0 - MARGIN)) for slave in self.slaves)
+
+    @cached_property
+    def lengths_m(self) -> FloatArray:
+        """What a single part may ask of each slave, shape (v,): again a little less."""
+        return np.array([slave.length_m * (1.0 - MARGIN) for slave in self.cautious_slaves])
+
+    @cached_property
+    def _legs_m(self) -> FloatArray:
+        """Length of each leg out, then of each leg home, shape (2 v,)."""
+        return shapely.length(np.array([*self.out, *self.home]))
+
+    def ways(self, lines: Sequence[LineString]) -> Ways:
+        """How far the ends of some lines lie from the slaves and from one another."""
+        ends = np.array([line.coords[end] for line in lines for end in (0, -1)])
+        docks = np.array([leg.coords[-1] for leg in self.out] + [leg.coords[0] for leg in self.home])
+        places, row = np.unique(np.vstack([ends, docks]), axis=0, return_inverse=True)
+        metres = self.router.distances(places)[np.ix_(row, row)]
+        count, boats = len(lines), len(self.slaves)
+        from_docks = metres[2 * count :, : 2 * count] + self._legs_m[:, None]
+        from_docks = from_docks.reshape(2, boats, count, 2)
+        between = metres[: 2 * count, : 2 * count].reshape(count, 2, count, 2).transpose(0, 2, 1, 3)
+        return Ways(from_docks[0], from_docks[1], between, shapely.length(np.asarray(lines)))

@@ -1,0 +1,18 @@
+"""Lines put together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely import LineString
+
+__all__ = ["joined"]
+
+
+def joined(lines: Sequence[LineString]) -> LineString:
+    """One line along all of some lines, without points that repeat the one before."""
+    points = np.concatenate([shapely.get_coordinates(line) for line in lines])
+    repeated = (points[1:] == points[:-1]).all(axis=1)
+    return LineString(points[np.concatenate([[True], ~repeated])])

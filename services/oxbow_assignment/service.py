@@ -1,0 +1,87 @@
+"""The stage `assignment`: shares of the water for masters, hot spots for slaves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from oxbow.contracts import Assignment, AssignRequest, Role, Share, Sortie, Vehicle
+from oxbow.recording import Show
+from oxbow_assignment.campaign import Campaign, plan_campaign
+from oxbow_assignment.sharing import shared
+from oxbow_assignment.show import show_campaign, show_partition, show_shares
+from oxbow_assignment.sorties import Journey
+
+__all__ = ["handle"]
+
+
+def handle(request: AssignRequest, show: Show) -> Assignment:
+    """Share the free space among the masters, and the hot spots among the slaves.
+
+    Raises
+    ------
+    InvalidMission
+        There is nobody to do what is asked for, hot spots overlap, or a figure is out of proportion.
+    Infeasible
+        A slave cannot reach the free space, or no shares are balanced.
+    """
+    # 1. Shares of the free space, each connected.
+    shares, imbalance = _shares(request, show) if request.share_free else ((), 0.0)
+    if not request.hot_spots or request.swath_m is None:
+        return Assignment(shares=shares, imbalance=imbalance)
+
+    # 2. Passes over every hot spot, in parts that fit, shared among the slaves, round after round.
+    slaves = _with_role(request.vehicles, Role.SLAVE)
+    campaign = plan_campaign(request.hot_spots, slaves, request.free, request.swath_m, seed=request.seed)
+    first, *others = campaign.schedule.rounds or ((),)
+
+    # 3. What has been planned, measured and shown.
+    sorties = _sorties(first, campaign)
+    further = tuple(sortie for journeys in others for sortie in _sorties(journeys, campaign))
+    show_campaign(request.hot_spots, campaign, sorties, further, show)
+    solution = campaign.schedule.first
+    return Assignment(
+        shares=shares,
+        imbalance=imbalance,
+        sorties=sorties,
+        further=further,
+        left=campaign.left,
+        treated_share=campaign.treated_share(first, request.swath_m),
+        makespan_s=max((sortie.duration_s for sortie in sorties), default=0.0),
+        joint_gap=None if solution is None else solution.gap.relative,
+        warnings=campaign.warnings,
+    )
+
+
+def _shares(request: AssignRequest, show: Show) -> tuple[tuple[Share, ...], float]:
+    masters = _with_role(request.vehicles, Role.MASTER)
+    sharing = shared(request.free, masters, request.footprint_m)
+    shares = tuple(
+        Share(vehicle=master.name, area=area) for master, area in zip(masters, sharing.areas, strict=True)
+    )
+    if sharing.partition is not None:
+        show_partition(sharing.partition, show)
+    show_shares(shares, show)
+    return shares, sharing.imbalance
+
+
+def _with_role(vehicles: Sequence[Vehicle], role: Role) -> tuple[Vehicle, ...]:
+    return tuple(vehicle for vehicle in vehicles if vehicle.role is role)
+
+
+def _sorties(journeys: Sequence[Journey], campaign: Campaign) -> tuple[Sortie, ...]:
+    """Journeys as messages; a hot spot of which a sortie treats several parts is named once."""
+    sorties = []
+    for journey in journeys:
+        slave = campaign.fleet.slaves[journey.slave]
+        parts = [campaign.division.parts[number] for number in journey.parts]
+        names = [campaign.treatments[part.treatment].spot.name for part in parts]
+        sorties.append(
+            Sortie(
+                vehicle=slave.name,
+                path=journey.path,
+                hot_spots=tuple(dict.fromkeys(names)),
+                length_m=journey.path.length,
+                duration_s=journey.path.length / slave.speed_mps,
+            )
+        )
+    return tuple(sorties)

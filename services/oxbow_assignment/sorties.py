@@ -1,0 +1,171 @@
+"""Sorties: who treats which parts in which order, in as many rounds as it takes, and the path of each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from shapely import LineString
+
+from oxbow.errors import Internal
+from oxbow_assignment.assign import Clustering
+from oxbow_assignment.division import Part
+from oxbow_assignment.fleet import Fleet, Ways
+from oxbow_assignment.joint import Solution, solve
+from oxbow_assignment.lines import joined
+from oxbow_assignment.problem import IntArray, Objective, Problem
+
+__all__ = ["Journey", "Schedule", "scheduled"]
+
+ROUNDING_M = 1e-6
+"""A path this near to the free space is in it."""
+
+JOINT_MOST = 15
+"""More parts than these are not given to the joint optimiser: it would take longer than all else."""
+
+PATIENCE = 100
+"""Of the joint optimiser; for so few parts it finds no better with more."""
+
+
+@dataclass(frozen=True)
+class Journey:
+    """What one slave does from its start to its recovery.
+
+    Parameters
+    ----------
+    slave
+        Its index.
+    parts
+        Indices of the parts that it treats, in order.
+    path
+        Leg, routes and parts by turns, and the leg home.
+    routes
+        Of these, what treats nothing.
+    """
+
+    slave: int
+    parts: tuple[int, ...]
+    path: LineString
+    routes: tuple[LineString, ...]
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """All journeys that it takes to treat all parts, in rounds: each slave goes once in a round, at most.
+
+    Parameters
+    ----------
+    rounds
+        The journeys of each round, in order of the slaves.
+    first
+        How the first round was assigned, with its gap to the joint optimiser.
+    """
+
+    rounds: tuple[tuple[Journey, ...], ...]
+    first: Solution | None
+
+
+def scheduled(parts: Sequence[Part], fleet: Fleet, *, seed: int = 0) -> Schedule:
+    """Assign parts to slaves, round after round, so that each round treats as much value as it can.
+
+    A part is a target whose two ends are apart. Between parts, the problem counts the mean of the ways from either
+    end of one to either end of the other, and half the length of both. The mean over all ways to turn the parts of
+    a tour round is what the problem counts: the best way, which is gone, is never longer.
+
+    Parameters
+    ----------
+    parts
+        Each fits the range of one slave at least.
+    fleet
+        The slaves.
+    seed
+        Where clustering starts.
+    """
+    if not parts:
+        return Schedule((), None)
+    ways = fleet.ways([part.line for part in parts])
+    left = np.arange(len(parts))
+    rounds: list[tuple[Journey, ...]] = []
+    first: Solution | None = None
+    while len(left):
+        patience = PATIENCE if first is None and len(left) <= JOINT_MOST else None
+        solution = solve(_problem(parts, fleet, ways, left), Clustering(seed=seed), patience=patience, seed=seed)
+        first = first or solution
+        tours = [left[list(tour.targets)] for tour in solution.clustered.assignment.tours]
+        rounds.append(
+            tuple(_journey(slave, tour, parts, fleet, ways) for slave, tour in enumerate(tours) if len(tour))
+        )
+        if not rounds[-1]:
+            raise Internal(f"{len(left)} parts that fit the range of a slave were left", where="sorties")
+        left = np.setdiff1d(left, np.concatenate(tours))
+    return Schedule(tuple(rounds), first)
+
+
+def _problem(parts: Sequence[Part], fleet: Fleet, ways: Ways, left: IntArray) -> Problem:
+    """The problem of what is left: mean ways between parts, with half of the parts' lengths on either side."""
+    count, boats = len(left), len(fleet.slaves)
+    half_m = ways.lengths_m[left] / 2
+    distances = np.zeros((count + 2 * boats, count + 2 * boats))
+    distances[:count, :count] = ways.between[np.ix_(left, left)].mean(axis=(2, 3)) + half_m[:, None] + half_m
+    access = np.vstack([ways.starts[:, left].mean(axis=2), ways.recoveries[:, left].mean(axis=2)]) + half_m
+    distances[count:, :count], distances[:count, count:] = access, access.T
+    np.fill_diagonal(distances, 0.0)
+    return Problem(
+        vehicles=fleet.cautious_slaves,
+        distances=distances,
+        objective=Objective.MAKESPAN,
+        values=np.array([parts[number].value for number in left.tolist()]),
+    )
+
+
+def _journey(slave: int, tour: IntArray, parts: Sequence[Part], fleet: Fleet, ways: Ways) -> Journey:
+    """The path of one tour, its parts turned the best way, checked."""
+    lines = [
+        parts[number].line.reverse() if backwards else parts[number].line
+        for number, backwards in zip(tour.tolist(), _turns(slave, tour, ways), strict=True)
+    ]
+    stops = [fleet.out[slave], *lines, fleet.home[slave]]
+    routes = [fleet.router.route(before.coords[-1], after.coords[0]).line for before, after in pairwise(stops)]
+    travelled = [stops[0], *(line for pair in zip(routes, stops[1:], strict=True) for line in pair)]
+    path = joined(travelled)
+    _require_conforming(path, fleet, slave)
+    return Journey(slave, tuple(tour.tolist()), path, tuple(routes))
+
+
+def _turns(slave: int, tour: IntArray, ways: Ways) -> list[bool]:
+    """Which parts to travel backwards, for the shortest path: by dynamic programming along the tour."""
+    metres = ways.starts[slave, tour[0]]
+    came_from: list[IntArray] = []
+    for before, after in pairwise(tour):
+        # Who enters at one end leaves at the other.
+        longer = metres[:, None] + ways.between[before, after][::-1]
+        came_from.append(longer.argmin(axis=0))
+        metres = longer.min(axis=0)
+    turns = [int((metres + ways.recoveries[slave, tour[-1]][::-1]).argmin())]
+    for best in reversed(came_from):
+        turns.append(int(best[turns[-1]]))
+    return [bool(turn) for turn in reversed(turns)]
+
+
+def _require_conforming(path: LineString, fleet: Fleet, slave: int) -> None:
+    """Check that a path is within the slave's range, and but for its legs inside the free space.
+
+    Raises
+    ------
+    Internal
+        It is not: a fault of the planner, which must not reach a vehicle.
+    """
+    vehicle = fleet.slaves[slave]
+    if path.length > vehicle.length_m:
+        raise Internal(f"the sortie is {path.length:.3f} m long, of {vehicle.length_m:.3f} m", vehicle.name)
+    allowed = shapely.union_all([fleet.free, fleet.out[slave], fleet.home[slave]])
+    stray = path.difference(allowed.buffer(ROUNDING_M))
+    if stray.length > ROUNDING_M:
+        place = stray.interpolate(0.5, normalized=True)
+        raise Internal(
+            f"the sortie leaves the free space for {stray.length:.3f} m, near ({place.x:.1f}, {place.y:.1f})",
+            vehicle.name,
+        )

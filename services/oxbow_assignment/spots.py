@@ -1,0 +1,62 @@
+"""Hot spots as they are given: checked against one another, and cut to the free space."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon, STRtree
+from shapely.geometry.base import BaseGeometry
+
+from oxbow.contracts import HotSpot
+from oxbow.errors import InvalidMission
+
+__all__ = ["OVERLAP", "require_apart", "waters"]
+
+OVERLAP = 1e-3
+"""Share of the smaller of two hot spots that both may have in common: contours are rounded."""
+
+LEAST = 1e-6
+"""A smaller share of a hot spot in the free space is nothing."""
+
+
+def require_apart(spots: Sequence[HotSpot]) -> None:
+    """Check that names tell hot spots apart, and that no two overlap: what is treated is treated once.
+
+    Raises
+    ------
+    InvalidMission
+        Names both hot spots, and the area that they have in common.
+    """
+    names = [spot.name for spot in spots]
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidMission(f"has {name!r} {names.count(name)} times; expected once", where="hot_spots")
+    areas = np.array([spot.area for spot in spots], dtype=object)
+    one, other = STRtree(areas).query(areas, predicate="intersects")
+    one, other = one[one < other], other[one < other]
+    common = shapely.area(shapely.intersection(areas[one], areas[other]))
+    smaller = np.minimum(shapely.area(areas[one]), shapely.area(areas[other]))
+    for index in np.flatnonzero(common > OVERLAP * smaller)[:1]:
+        raise InvalidMission(
+            f"hot spots {names[one[index]]!r} and {names[other[index]]!r} overlap in {common[index]:.4g} m2;"
+            " expected areas apart",
+            where="hot_spots",
+        )
+
+
+def waters(spots: Sequence[HotSpot], free: Polygon) -> list[BaseGeometry]:
+    """The part of each hot spot in the free space: polygons, empty where there is next to none."""
+    cut = [shapely.intersection(spot.area, free) for spot in spots]
+    areal = [_areal(geometry) for geometry in cut]
+    return [
+        water if water.area > LEAST * spot.area.area else Polygon()
+        for spot, water in zip(spots, areal, strict=True)
+    ]
+
+
+def _areal(geometry: BaseGeometry) -> BaseGeometry:
+    """The polygons of a geometry, without what touches only."""
+    parts = shapely.get_parts(geometry)
+    return MultiPolygon(parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON].tolist())
