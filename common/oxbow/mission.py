@@ -14,13 +14,14 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from oxbow.contracts import MAX_REQUEST_BYTES, Variogram
+from oxbow.contracts import MAX_REQUEST_BYTES, Role, Variogram
 from oxbow.errors import InvalidMission
 from oxbow.files import read_bytes, write_atomically
 from oxbow.frame import Position, lonlat
 from oxbow.plan import PlanOptions, PlanRecord
-from oxbow.prior import PriorModel, parse_prior, prior_document
+from oxbow.prior import PriorFeature, PriorModel, parse_prior, prior_document
 from oxbow.strict_json import decode_json, gathered
+from oxbow.vehicles import GivenVehicle, VehiclePath, gathered_vehicles, require_distinct, vehicle_document
 
 __all__ = [
     "Bloom",
@@ -33,7 +34,6 @@ __all__ = [
     "mission_json",
     "parse_mission",
     "read_mission",
-    "require_plannable",
     "write_mission",
 ]
 
@@ -47,9 +47,20 @@ class MissionType(enum.StrEnum):
     MAP_AND_TREAT = "map&treat"
     ADAP_AND_TREAT = "adap&treat"
 
+    @property
+    def roles(self) -> tuple[Role, ...]:
+        """Who takes part (Rendas and Li 2016, section 1.1)."""
+        return _ROLES[self]
 
+
+_ROLES = {
+    MissionType.MAP: (Role.MASTER,),
+    MissionType.ADAP: (Role.MASTER,),
+    MissionType.TREAT: (Role.SLAVE,),
+    MissionType.MAP_AND_TREAT: (Role.MASTER, Role.SLAVE),
+    MissionType.ADAP_AND_TREAT: (Role.MASTER, Role.SLAVE),
+}
 NEEDS_BLOOM = frozenset({MissionType.ADAP, MissionType.MAP_AND_TREAT, MissionType.ADAP_AND_TREAT})
-PLANNABLE = (MissionType.MAP, MissionType.ADAP)
 
 
 class Bloom(msgspec.Struct, frozen=True, kw_only=True, rename={"sensor": "Sensor", "value": "Value"}):
@@ -74,9 +85,12 @@ _JSON_NAMES = {
     "slave_length_m": "Slave_length",
     "safety_m": "Safety",
     "minimal_spatial_rate_m": "Minimal_spatial_rate",
+    "swath_m": "Swath",
+    "vehicles": "Vehicles",
     "prior_model": "PriorModel",
     "master_path": "Master_Path",
     "slave_path": "Slave_Path",
+    "paths": "Paths",
     "plan": "Plan",
 }
 _POSITIVE = (
@@ -85,6 +99,7 @@ _POSITIVE = (
     "master_length_m",
     "slave_length_m",
     "minimal_spatial_rate_m",
+    "swath_m",
 )
 
 
@@ -113,8 +128,14 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
         Least distance from the outline and the zones.
     minimal_spatial_rate_m
         Least distance between parallel segments of the path; absent: as close as the length allows.
+    swath_m
+        Width of the water that one pass of a slave treats; absent: the minimal spatial rate.
+    vehicles
+        Who takes part; absent: one master and one slave, as far as the mission's type needs them.
     prior_model
         What is known of the field beforehand.
+    paths
+        The path of every vehicle, of a mission that names its vehicles.
     extra
         Fields without a meaning here, kept as they came.
     """
@@ -132,9 +153,12 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
     slave_length_m: float = 15_000.0
     safety_m: float = 0.0
     minimal_spatial_rate_m: float | None = None
+    swath_m: float | None = None
+    vehicles: tuple[GivenVehicle, ...] | None = None
     prior_model: PriorModel | None = None
     master_path: tuple[Position, ...] | None = None
     slave_path: tuple[Position, ...] | None = None
+    paths: tuple[VehiclePath, ...] | None = None
     plan: PlanRecord | None = None
     outline_name: OutlineName = OutlineName.BOUNDING_BOX
     extra: dict[str, Any] = {}
@@ -154,12 +178,46 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
             raise InvalidMission(f"is {self.bloom.value!r}; expected a finite number", where="Bloom.Value")
         if clash := FIELD_NAMES & self.extra.keys():
             raise InvalidMission("is a field of the Mission File, not an extra one", where=min(clash))
+        self._check_vehicles()
         self._check_positions()
+
+    @property
+    def planned_paths(self) -> tuple[VehiclePath, ...]:
+        """The path of every vehicle that has one, under whichever field it stands."""
+        own = ((Role.MASTER, self.master_path), (Role.SLAVE, self.slave_path))
+        of_roles = (VehiclePath(name=role.value, role=role, path=path) for role, path in own if path)
+        return (*of_roles, *(self.paths or ()))
+
+    @property
+    def treated_swath_m(self) -> float | None:
+        """Width of the water that one pass treats, where the mission says it."""
+        return self.swath_m or self.minimal_spatial_rate_m
+
+    @property
+    def hot_features(self) -> tuple[tuple[int, PriorFeature], ...]:
+        """What is to be treated, with its index: the prior model's values at or above the threshold."""
+        least = -math.inf if self.bloom is None else self.bloom.value
+        features = () if self.prior_model is None else self.prior_model.features
+        return tuple(
+            (index, feature)
+            for index, feature in enumerate(features)
+            if feature.value is not None and feature.value >= least
+        )
 
     @property
     def variogram(self) -> Variogram | None:
         """How the field varies from place to place, where that is known."""
         return None if self.prior_model is None else self.prior_model.variogram
+
+    def _check_vehicles(self) -> None:
+        if self.vehicles is None:
+            return
+        require_distinct(self.vehicles)
+        for role in self.mission_type.roles:
+            if all(vehicle.role is not role for vehicle in self.vehicles):
+                raise InvalidMission(
+                    f"has no {role}; expected one or more for a mission of type {self.mission_type}", "Vehicles"
+                )
 
     def _check_positions(self) -> None:
         _require_degrees("LaunchPoint", (self.launch,), indexed=False)
@@ -170,6 +228,11 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
             _require_degrees(f"ForbiddenZones[{index}]", zone)
         _require_degrees("Master_Path", self.master_path or ())
         _require_degrees("Slave_Path", self.slave_path or ())
+        for index, vehicle in enumerate(self.vehicles or ()):
+            for name, place in (("Start", vehicle.start), ("Recovery", vehicle.recovery)):
+                _require_degrees(f"Vehicles[{index}].{name}", (place,) if place else (), indexed=False)
+        for index, planned in enumerate(self.paths or ()):
+            _require_degrees(f"Paths[{index}].Path", planned.path)
 
 
 FIELD_NAMES = frozenset(_JSON_NAMES.values()) | {name.value for name in OutlineName}
@@ -188,15 +251,6 @@ def _require_degrees(name: str, positions: Sequence[Position], *, indexed: bool 
         raise InvalidMission(f"is {position.long!r}; expected -180 .. 180 degrees", where=f"{where}.long")
     swapped = " (latitude and longitude look swapped)" if abs(position.long) <= 90.0 else ""
     raise InvalidMission(f"is {position.lat!r}; expected -90 .. 90 degrees{swapped}", where=f"{where}.lat")
-
-
-def require_plannable(mission: Mission) -> None:
-    """Raise `InvalidMission` where the mission's type is one that cannot be planned by now."""
-    if mission.mission_type not in PLANNABLE:
-        raise InvalidMission(
-            f"is {mission.mission_type.value!r}; only {' and '.join(PLANNABLE)} missions can be planned by now",
-            where="MissionType",
-        )
 
 
 # --------------------------------------------------------------------------- the file
@@ -220,6 +274,8 @@ def parse_mission(data: bytes) -> Mission:
     if "Bloom" in document and bytes(document["Bloom"]).startswith(b"{"):
         bloom = gathered(decode_json(bytes(document["Bloom"]), dict[str, msgspec.Raw], "Bloom"), _BLOOM_NAMES)
         document["Bloom"] = msgspec.Raw(msgspec.json.encode(bloom))
+    if "Vehicles" in document and bytes(document["Vehicles"]).startswith(b"["):
+        document["Vehicles"] = gathered_vehicles(bytes(document["Vehicles"]))
     if names:
         document["BoundingBox"] = document.pop(names[0])
         document["outline_name"] = msgspec.Raw(msgspec.json.encode(names[0]))
@@ -236,13 +292,15 @@ def parse_mission(data: bytes) -> Mission:
 def mission_json(mission: Mission) -> bytes:
     """The Mission File of a mission: the input fields, the unknown ones, and last the paths and the plan."""
     given = {json: getattr(mission, field) for field, json in _JSON_NAMES.items()}
-    outputs = {name: given.pop(name) for name in ("Master_Path", "Slave_Path", "Plan")}
+    outputs = {name: given.pop(name) for name in ("Master_Path", "Slave_Path", "Paths", "Plan")}
     outline = given.pop("BoundingBox")
     if mission.prior_model is not None:
         given["PriorModel"] = prior_document(mission.prior_model)
     if mission.bloom is not None:
         bloom = mission.bloom
         given["Bloom"] = {"Sensor": bloom.sensor, "Value": bloom.value} | bloom.extra
+    if mission.vehicles is not None:
+        given["Vehicles"] = [vehicle_document(vehicle) for vehicle in mission.vehicles]
     document = given | {mission.outline_name.value: outline} | mission.extra | outputs
     present = {name: value for name, value in document.items() if value is not None or name in mission.extra}
     return msgspec.json.format(msgspec.json.encode(present), indent=2) + b"\n"

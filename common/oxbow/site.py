@@ -9,11 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from shapely import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
 
-from oxbow.contracts import FloatArray, Place, WeightedArea
+from oxbow.contracts import FloatArray, HotSpot, Place, Role, WeightedArea
 from oxbow.errors import Infeasible, InvalidMission
+from oxbow.fleet import Member, members
 from oxbow.frame import Frame, Position, lonlat
-from oxbow.mission import Mission
+from oxbow.hot_spots import HotSpots, hot_spots
+from oxbow.mission import Mission, MissionType
 from oxbow.weights import weighted_areas
 
 __all__ = ["Site"]
@@ -22,6 +25,8 @@ MAX_RADIUS_M = 300_000.0
 """How far a site may reach from the mean of its contour's points, and a launch point may lie from the water."""
 LEAST_WIDTH_M = 1e-3
 """Points that lie in a strip narrower than this lie on one line."""
+ON_SHORE_M = 1.0
+"""A vehicle's start no farther than this from the water is on its shore."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +41,18 @@ class Site:
     zones
         The forbidden zones that meet the outline; they may overlap one another and cross the outline.
     launch, recovery
-        The path's ends.
+        The mission's own points.
+    members
+        The vehicles that take part, those of the first role first.
+    area_m2
+        Area of the water: the outline less the zones.
     nominal_spacing_m
-        Water area / greatest length (Rendas and Li 2016, section 1.2.1.1, step 5), or the mission's least
-        spacing where that is more.
+        Water area / greatest length of those who survey (Rendas and Li 2016, section 1.2.1.1, step 5), or the
+        mission's least spacing where that is more; the swath where nobody surveys.
     weighted_areas
         Where sampling is more or less important than elsewhere.
+    hot_spots
+        What is to be treated.
     warnings
         What the mission's author should know.
     """
@@ -51,9 +62,16 @@ class Site:
     zones: tuple[Polygon, ...]
     launch: Place
     recovery: Place
+    members: tuple[Member, ...]
+    area_m2: float
     nominal_spacing_m: float
     weighted_areas: tuple[WeightedArea, ...] = ()
+    hot_spots: tuple[HotSpot, ...] = ()
     warnings: tuple[str, ...] = ()
+
+    def team(self, role: Role) -> tuple[Member, ...]:
+        """The vehicles of one role."""
+        return tuple(member for member in self.members if member.vehicle.role is role)
 
     @classmethod
     def of(cls, mission: Mission) -> Site:
@@ -63,7 +81,9 @@ class Site:
         ------
         InvalidMission
             A contour has no area, the outline meets itself or reaches farther than 300 km from its mean
-            point, or a point lies farther than that from the water; the error names field, index and value.
+            point, a point lies farther than that from the water, a vehicle's own start or recovery lies outside
+            the water, or what is to be treated is missing, on land or overlaps; the error names field, index and
+            value.
         Infeasible
             The forbidden zones cover all of the water.
         """
@@ -75,15 +95,27 @@ class Site:
         if water.area == 0.0:
             raise Infeasible("cover all of the water; nothing is left to plan on", where="ForbiddenZones")
         areas = () if mission.prior_model is None else weighted_areas(mission.prior_model, frame, outline)
+        spots = _hot_spots(mission, frame, outline, water)
+
+        def locate(name: str, position: Position) -> Place:
+            place = _place(name, position, frame, outline)
+            if name.startswith("Vehicles"):
+                _require_afloat(name, place, water)
+            return place
+
+        fleet = members(mission, locate)
         return cls(
             frame=frame,
             outline=outline,
             zones=zones,
-            launch=_place("LaunchPoint", mission.launch, frame, outline),
-            recovery=_place("RecoveryPoint", mission.recovery or mission.launch, frame, outline),
-            nominal_spacing_m=max(water.area / mission.master_length_m, mission.minimal_spatial_rate_m or 0.0),
+            launch=locate("LaunchPoint", mission.launch),
+            recovery=locate("RecoveryPoint", mission.recovery or mission.launch),
+            members=fleet,
+            area_m2=water.area,
+            nominal_spacing_m=_nominal_spacing_m(mission, fleet, water.area),
             weighted_areas=areas,
-            warnings=warnings + _prior_warnings(mission, areas),
+            hot_spots=spots.spots,
+            warnings=warnings + _prior_warnings(mission, areas) + spots.warnings + _idle_warnings(mission),
         )
 
 
@@ -176,6 +208,50 @@ def _prior_warnings(mission: Mission, areas: tuple[WeightedArea, ...]) -> tuple[
     if areas or all(feature.weight is None for feature in features):
         return ()
     return (f"PriorModel has no weight other than 1 inside {mission.outline_name}: its weights change nothing",)
+
+
+def _hot_spots(mission: Mission, frame: Frame, outline: Polygon, water: BaseGeometry) -> HotSpots:
+    """What the slaves are to treat, where the mission has any."""
+    if Role.SLAVE not in mission.mission_type.roles:
+        return HotSpots()
+    features = mission.hot_features
+    if features and mission.treated_swath_m is None:
+        raise InvalidMission(
+            "is missing; expected the width in metres that one pass treats, or Minimal_spatial_rate in its place",
+            where="Swath",
+        )
+    found = hot_spots(features, frame, outline, water, mission.treated_swath_m or 0.0)
+    if mission.mission_type is MissionType.TREAT and not found.spots:
+        least = "" if mission.bloom is None else f" of {mission.bloom.value:g} or more"
+        raise InvalidMission(
+            f"has no hot spot in the water; a mission of type {mission.mission_type} needs a feature with a value"
+            f"{least}",
+            where="PriorModel",
+        )
+    return found
+
+
+def _nominal_spacing_m(mission: Mission, fleet: Sequence[Member], area_m2: float) -> float:
+    least_m = mission.minimal_spatial_rate_m or 0.0
+    if mission.mission_type is MissionType.TREAT:
+        return mission.treated_swath_m or least_m
+    lengths_m = [member.vehicle.length_m for member in fleet if member.vehicle.role is Role.MASTER]
+    return max(area_m2 / sum(lengths_m), least_m)
+
+
+def _idle_warnings(mission: Mission) -> tuple[str, ...]:
+    idle = [vehicle.name for vehicle in mission.vehicles or () if vehicle.role not in mission.mission_type.roles]
+    if not idle:
+        return ()
+    return (f"Vehicles: {', '.join(idle)} take no part in a mission of type {mission.mission_type}",)
+
+
+def _require_afloat(name: str, place: Place, water: BaseGeometry) -> None:
+    distance_m = float(shapely.distance(water, Point(place)))
+    if distance_m > ON_SHORE_M:
+        raise InvalidMission(
+            f"lies {distance_m:.0f} m outside the water; expected a place in it or on its shore", where=name
+        )
 
 
 def _enclosed(zone: Polygon) -> list[Polygon]:

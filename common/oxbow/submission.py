@@ -80,7 +80,7 @@ class Submission:
     @cached_property
     def document(self) -> bytes:
         """The Mission File without an earlier plan: the same bytes for the same mission however it was written."""
-        unplanned = msgspec.structs.replace(self.mission, master_path=None, slave_path=None, plan=None)
+        unplanned = msgspec.structs.replace(self.mission, master_path=None, slave_path=None, paths=None, plan=None)
         return mission_json(unplanned)
 
     @cached_property

@@ -10,12 +10,13 @@ import numpy.typing as npt
 import shapely
 from shapely import MultiPolygon, Polygon, STRtree, box
 from shapely.affinity import translate
+from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray, WeightedArea
 from oxbow.frame import Frame
 from oxbow.prior import PriorModel
 
-__all__ = ["weighted_areas"]
+__all__ = ["planar", "weighted_areas"]
 
 EDGE_DEG = 0.01
 """Edges are straight in degrees (RFC 7946, section 3.1.1): so short, they are so in the plane, within 2 cm."""
@@ -52,6 +53,12 @@ def weighted_areas(prior: PriorModel, frame: Frame, outline: Polygon) -> tuple[W
     chosen = planar.where(shapely.intersects(outline, planar.areas) & (planar.weights != 1.0))
     pairs = zip(chosen.areas, chosen.weights.tolist(), strict=True)
     return tuple(WeightedArea(area=area, weight=weight) for area, weight in pairs)
+
+
+def planar(geometry: BaseGeometry, frame: Frame, outline: Polygon) -> BaseGeometry:
+    """A geometry in degrees, in the plane of a site; far from the site's outline, nothing is left of it."""
+    near = geometry.intersection(_surroundings(frame, outline))
+    return shapely.make_valid(shapely.transform(shapely.segmentize(near, EDGE_DEG), frame.to_planar))
 
 
 def _surroundings(frame: Frame, outline: Polygon) -> MultiPolygon:

@@ -15,10 +15,10 @@ from types import FrameType
 from typing import TypeVar
 
 from oxbow.client import Client
-from oxbow.contracts import STAGES, Endpoint, Message, MissionStatus
+from oxbow.contracts import Endpoint, Message, MissionStatus
 from oxbow.errors import DeadlineExceeded
 from oxbow.mission import Mission
-from oxbow.pipeline import Call, plan_mission
+from oxbow.pipeline import Call, expected_calls, plan_mission
 from oxbow.plan import PlanOptions
 from oxbow_cli.arguments import writing
 from oxbow_cli.exits import DEBUG
@@ -58,7 +58,7 @@ class Planned:
 def plan_here(job: Job) -> Planned:
     """Plan in this process, without a bus and without a recording."""
     with _deadline(job.timeout_s):
-        call = _Reported(local_call(), job.progress)
+        call = _Reported(local_call(), job.progress, expected_calls(job.mission))
         return Planned(plan_mission(job.mission, job.options, call=call))
 
 
@@ -110,13 +110,15 @@ def plan_embedded(job: Job, recording: Path | None, recordings: Path) -> Planned
 class _Reported:
     """A call that tells the progress before each stage."""
 
-    def __init__(self, call: Call, progress: Progress) -> None:
+    def __init__(self, call: Call, progress: Progress, expected: int) -> None:
         self.call = call
         self.progress = progress
-        self.order = [endpoint.stage for endpoint in STAGES]
+        self.expected = expected
+        self.made = 0
 
     def __call__(self, endpoint: Endpoint[Q, R], request: Q, /) -> R:
-        self.progress(endpoint.stage, self.order.index(endpoint.stage) / len(self.order))
+        self.progress(endpoint.stage, min(self.made / self.expected, 1.0))
+        self.made += 1
         return self.call(endpoint, request)
 
 

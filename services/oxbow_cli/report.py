@@ -86,7 +86,7 @@ def _plan_table(site: str, plan: PlanRecord) -> Table:
     certificate = plan.certificate
     rows = [
         ("method", f"{plan.method}, seed {plan.seed}"),
-        ("heading", f"{plan.heading_deg % 180:.1f} deg"),
+        ("heading", "-" if plan.heading_deg is None else f"{plan.heading_deg % 180:.1f} deg"),
         ("spacing", f"{plan.spacing_m:.1f} m"),
         ("length", f"{_length(plan.length_m)} of {_length(plan.max_length_m)} ({_share(plan)})"),
         ("duration", _duration(plan.duration_s)),

@@ -15,10 +15,10 @@ from shapely import Point
 from oxbow import codec
 from oxbow.bus import Bus, BusCall
 from oxbow.bus.query import MSGPACK
-from oxbow.contracts import STAGES, Endpoint, Message, any_layer_key, layer_key
+from oxbow.contracts import Endpoint, Message, any_layer_key, layer_key
 from oxbow.errors import Internal, OxbowError, Unavailable
 from oxbow.mission import Mission, mission_json, parse_mission
-from oxbow.pipeline import plan_mission
+from oxbow.pipeline import expected_calls, plan_mission
 from oxbow.recording import Layer, LayerKind, Stamped
 from oxbow.site import Site
 from oxbow.submission import SubmissionParameters
@@ -32,7 +32,6 @@ Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
 
 STAGE = "mission"
-ORDER = tuple(endpoint.stage for endpoint in STAGES)
 _log = logging.getLogger(__name__)
 
 
@@ -107,6 +106,7 @@ class _Run:
         self.mission = parse_mission(job.request.document)
         self.site = Site.of(self.mission)
         self.seconds: dict[str, float] = {}
+        self.calls, self.expected_calls = 0, expected_calls(self.mission)
         self._call = BusCall(
             bus,
             mission_id=job.revision.mission_id,
@@ -129,12 +129,15 @@ class _Run:
         """Call a stage, and tell that it is at work."""
         if self.registry.closed:
             raise Unavailable("the service stops; the mission goes on another time", where=STAGE)
-        self.registry.note_progress(self.job, endpoint.stage, ORDER.index(endpoint.stage) / len(ORDER))
+        fraction = min(self.calls / self.expected_calls, 1.0)
+        self.registry.note_progress(self.job, endpoint.stage, fraction)
+        self.calls += 1
         started = time.monotonic()
         try:
             return self._call(endpoint, request)
         finally:
-            self.seconds[f"{endpoint.stage}_s"] = time.monotonic() - started
+            name = f"{endpoint.stage}_s"
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.monotonic() - started
 
     def _show_outcome(self, name: str, text: str) -> None:
         # Not droppable: it tells the recorder that nothing more will come.
@@ -157,11 +160,15 @@ class _Run:
 
 def _site_layer(site: Site) -> Layer:
     zones = ("forbidden zone",) * len(site.zones)
+    places = {"launch": site.launch, "recovery": site.recovery}
+    for vehicle in (member.vehicle for member in site.members if member.is_named):
+        places |= {f"{vehicle.name}: start": vehicle.start, f"{vehicle.name}: recovery": vehicle.recovery}
+    names, ends = places.keys(), map(Point, places.values())
     return Layer(
         stage=STAGE,
         name="site",
-        geometries=(site.outline, *site.zones, Point(site.launch), Point(site.recovery)),
-        labels=("outline", *zones, "launch", "recovery"),
+        geometries=(site.outline, *site.zones, *ends, *(spot.area for spot in site.hot_spots)),
+        labels=("outline", *zones, *names, *(spot.name for spot in site.hot_spots)),
     )
 
 

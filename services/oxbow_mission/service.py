@@ -19,7 +19,6 @@ from oxbow.contracts import (
     mission_key,
 )
 from oxbow.errors import Internal, InvalidMission, OxbowError
-from oxbow.mission import require_plannable
 from oxbow.site import Site
 from oxbow.submission import Submission
 from oxbow_mission.registry import Registry, is_replan
@@ -122,7 +121,6 @@ class MissionService:
     def _take_in(self, document: bytes, parameters: dict[str, str]) -> MissionStatus:
         """Check all of a request, so that its sender hears of every fault at once; then keep it."""
         submission = Submission.parse(document, parameters)
-        require_plannable(submission.mission)
         Site.of(submission.mission)
         return self.registry.accept(submission)
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from oxbow.contracts import MAX_REQUEST_BYTES
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.mission import Mission, mission_json, parse_mission, read_mission, require_plannable, write_mission
+from oxbow.mission import Mission, mission_json, parse_mission, read_mission, write_mission
 from oxbow.pipeline import plan_mission
 from oxbow.site import Site
 from oxbow_cli.local import local_call
@@ -191,13 +191,6 @@ def test_a_site_across_the_antimeridian_is_planar():
     here = [at(-17.0, 9.95), at(-17.0, 10.05), at(-16.9, 10.05), at(-16.9, 9.95)]
     across = site(BoundingBox=east, LaunchPoint=east[0])
     assert across.outline.area == pytest.approx(site(BoundingBox=here, LaunchPoint=here[0]).outline.area, rel=1e-9)
-
-
-@pytest.mark.parametrize("kind", ["treat", "map&treat", "adap&treat"])
-def test_types_that_are_not_planned_yet_are_refused(kind):
-    mission = parsed(MissionType=kind, Bloom={"Sensor": "chl", "Value": 3.0})
-    with pytest.raises(InvalidMission, match="MissionType"):
-        require_plannable(mission)
 
 
 json_values = st.recursive(

@@ -1,0 +1,93 @@
+"""The vehicles of a Mission File, and the paths that are planned for them (the fields `Vehicles` and `Paths`)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+
+from oxbow.contracts import Role
+from oxbow.errors import InvalidMission
+from oxbow.frame import Position
+from oxbow.strict_json import decode_json, gathered
+
+__all__ = ["GivenVehicle", "VehiclePath", "gathered_vehicles", "require_distinct", "vehicle_document"]
+
+_JSON_NAMES = {
+    "name": "Name",
+    "role": "Role",
+    "speed_mps": "Speed",
+    "length_m": "Length",
+    "start": "Start",
+    "recovery": "Recovery",
+}
+
+
+class GivenVehicle(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
+    """One vehicle of a mission.
+
+    Parameters
+    ----------
+    name
+        Tells it from the others.
+    role
+        A master surveys, a slave treats (Rendas and Li 2016, section 1.1).
+    speed_mps, length_m
+        Its speed and the greatest length of its path; the mission's own for its role where absent.
+    start, recovery
+        Where its path starts and ends; the mission's launch and recovery points where absent.
+    extra
+        Fields without a meaning here, kept as they came.
+    """
+
+    name: str
+    role: Role
+    speed_mps: float | None = None
+    length_m: float | None = None
+    start: Position | None = None
+    recovery: Position | None = None
+    extra: dict[str, Any] = {}
+
+
+class VehiclePath(
+    msgspec.Struct, frozen=True, kw_only=True, rename={"name": "Name", "role": "Role", "path": "Path"}
+):
+    """The path that is planned for one vehicle."""
+
+    name: str
+    role: Role
+    path: tuple[Position, ...]
+
+
+def gathered_vehicles(data: bytes) -> msgspec.Raw:
+    """The JSON of `Vehicles`, the fields of each without a meaning here gathered in its `extra`."""
+    vehicles = decode_json(data, list[dict[str, msgspec.Raw]], "Vehicles", at="Vehicles")
+    known = frozenset(_JSON_NAMES.values())
+    return msgspec.Raw(msgspec.json.encode([gathered(vehicle, known) for vehicle in vehicles]))
+
+
+def vehicle_document(vehicle: GivenVehicle) -> dict[str, Any]:
+    """A vehicle as the Mission File has it."""
+    fields = {json: getattr(vehicle, field) for field, json in _JSON_NAMES.items()}
+    return {name: value for name, value in fields.items() if value is not None} | vehicle.extra
+
+
+def require_distinct(vehicles: Sequence[GivenVehicle]) -> None:
+    """Check that every vehicle has a name of its own, and a speed and a range that are numbers above 0."""
+    seen: dict[str, int] = {}
+    for index, vehicle in enumerate(vehicles):
+        where = f"Vehicles[{index}]"
+        if not vehicle.name:
+            raise InvalidMission("is empty; expected a name for every vehicle", where=f"{where}.Name")
+        if (first := seen.setdefault(vehicle.name, index)) < index:
+            raise InvalidMission(
+                f"is {vehicle.name!r}, as that of Vehicles[{first}]; expected a name of its own", f"{where}.Name"
+            )
+        for field in ("speed_mps", "length_m"):
+            value = getattr(vehicle, field)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise InvalidMission(
+                    f"is {value!r}; expected a finite number > 0", where=f"{where}.{_JSON_NAMES[field]}"
+                )
