@@ -15,8 +15,10 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 from shapely import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray
+from oxbow_path.walk.legs import ROUNDING_M
 from oxbow_path.walk.region import largest
 
 __all__ = ["enclosed"]
@@ -52,7 +54,20 @@ def enclosed(way: FloatArray, free: Polygon, lane_m: float) -> Polygon:
     inside = shapely.covers(region, twice)
     added = shapely.buffer([*twice[~inside], *_meetings(stretches)], lane_m, quad_segs=QUAD_SEGS)
     region = largest(region.union(shapely.union_all(added).intersection(free)))
+    region = largest(region.union(_moats(region, free, lane_m)))
     return _slit(region, shapely.buffer(twice[inside], lane_m, quad_segs=QUAD_SEGS))
+
+
+def _moats(region: Polygon, free: Polygon, width_m: float) -> BaseGeometry:
+    """The enclosed islands that a tour turns round or passes by a hair, and the water about them.
+
+    Their corners could reach through the region's boundary by rounding, and would open it all round the island.
+    """
+    islands = np.array([Polygon(ring) for ring in free.interiors], dtype=object)
+    enclosed_ones = islands[shapely.contains(region, shapely.point_on_surface(islands))]
+    touching = enclosed_ones[shapely.dwithin(enclosed_ones, region.exterior, ROUNDING_M)]
+    water = shapely.union_all(shapely.buffer(touching, width_m, quad_segs=QUAD_SEGS)).intersection(free)
+    return shapely.union_all([water, *touching])
 
 
 def _slit(region: Polygon, slits: npt.NDArray[np.object_]) -> Polygon:

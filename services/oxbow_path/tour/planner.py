@@ -60,6 +60,9 @@ NEAR = 4.0
 GAP = 0.85
 """Water farther than this from every site is given one more, in pitches."""
 
+CLEAR_M = 1e-9
+"""Parts of a path nearer to each other than this may cross once it is turned."""
+
 LANE = 0.1
 """Half width of a lane, in pitches."""
 
@@ -109,6 +112,10 @@ class TourTrial:
     def length_m(self) -> float:
         return self.trial.length_m
 
+    def fits(self, budget: Budget) -> bool:
+        """Whether the path is short enough, and not simple by rounding alone: still so when turned."""
+        return budget.fits(self.length_m) and bool(shapely.minimum_clearance(self.path) > CLEAR_M)
+
     @property
     def spacing_m(self) -> float:
         """Distance of neighbouring sites, and about that of neighbouring legs."""
@@ -148,7 +155,7 @@ def plan_tour(task: Task, *, solver: Solver | None = None) -> TourPlan:
     trials = list(_fitted(attempt, first, most, budget))
     if not any(_is_enough(trial, budget, most) for trial in trials):
         trials.extend(_shortened(attempt, trials, budget))
-    fitting = [trial for trial in trials if budget.fits(trial.length_m)]
+    fitting = [trial for trial in trials if trial.fits(budget)]
     if not fitting:
         shortest_m = min(trial.length_m for trial in trials)
         raise Infeasible(
@@ -157,13 +164,14 @@ def plan_tour(task: Task, *, solver: Solver | None = None) -> TourPlan:
         )
     chosen = min(fitting, key=lambda trial: _score(trial, task.waters, budget))
     if not _is_enough(chosen, budget, most):
-        chosen = replace(chosen, trial=with_remainder(chosen.trial, task.waters, budget))
+        longer = replace(chosen, trial=with_remainder(chosen.trial, task.waters, budget))
+        chosen = longer if longer.fits(budget) else chosen
     return TourPlan(chosen, tuple(trials))
 
 
 def _is_enough(trial: TourTrial, budget: Budget, most: int) -> bool:
     """Whether a path fits the length, and uses it or has as many sites as there may be."""
-    return budget.fits(trial.length_m) and (trial.length_m >= budget.enough_m or trial.tour.count >= most)
+    return trial.fits(budget) and (trial.length_m >= budget.enough_m or trial.tour.count >= most)
 
 
 def _score(trial: TourTrial, waters: Waters, budget: Budget) -> float:
@@ -268,7 +276,7 @@ def _shortened(attempt: _Attempt, trials: Sequence[TourTrial], budget: Budget) -
 
     Where all are too long, the last visits nothing but the entries.
     """
-    too_long = [trial for trial in trials if not budget.fits(trial.length_m)]
+    too_long = [trial for trial in trials if not trial.fits(budget)]
     if not too_long:
         return
     whole = min(too_long, key=lambda trial: trial.length_m)
@@ -282,8 +290,8 @@ def _shortened(attempt: _Attempt, trials: Sequence[TourTrial], budget: Budget) -
         tried.add(len(order))
         trial = attempt.path(replace(whole.tour, order=order))
         yield trial
-        fits = fits or budget.fits(trial.length_m)
-        if budget.enough_m <= trial.length_m <= budget.most_m:
+        fits = fits or trial.fits(budget)
+        if trial.fits(budget) and trial.length_m >= budget.enough_m:
             break
         tour_m = max(0.0, tour_m + target_m - trial.length_m)
     if not fits:
