@@ -24,6 +24,8 @@ from oxbow.contracts import (
     MAX_REQUEST_BYTES,
     PLAN_KEY,
     STAGES,
+    Assignment,
+    AssignRequest,
     Cell,
     Certificate,
     CertifyRequest,
@@ -37,16 +39,22 @@ from oxbow.contracts import (
     Endpoint,
     FreeSpace,
     HeadingScore,
+    HotSpot,
+    LeftSpot,
     Method,
     MissionKey,
     MissionState,
     MissionStatus,
     PathPlan,
     PathRequest,
+    Role,
+    Share,
+    Sortie,
     SpacingStep,
     Track,
     Variogram,
     VariogramModel,
+    Vehicle,
     WeightedArea,
     any_introspection_key,
     layer_key,
@@ -104,6 +112,7 @@ DECOMPOSITION = Decomposition(
     scores=(HeadingScore(heading_rad=0.0, predicted_cost=0.052),),
 )
 PATH = LineString([(5.0, 5.0), (5.0, 55.0), (50.0, 55.0), (50.0, 15.0), (95.0, 15.0), (95.0, 5.0), (5.0, 5.0)])
+SORTIE = LineString([(5.0, 5.0), (20.0, 25.0), (40.0, 25.0), (5.0, 5.0)])
 
 EXAMPLES: dict[type[msgspec.Struct], msgspec.Struct] = {
     type(example): example
@@ -121,6 +130,25 @@ EXAMPLES: dict[type[msgspec.Struct], msgspec.Struct] = {
             area_m2=42.0, reason="apart from the largest water", place=(3.0, 4.0), outline=box(0, 0, 6, 7)
         ),
         SPACE,
+        AssignRequest(
+            free=SPACE.free,
+            vehicles=(Vehicle(name="tern", length_m=2_000.0, start=(5.0, 5.0), recovery=(5.0, 5.0)),),
+            hot_spots=(HotSpot(name="features[0]", area=box(20.0, 20.0, 40.0, 30.0), value=12.0),),
+            swath_m=10.0,
+        ),
+        Assignment(
+            sorties=(
+                Sortie(
+                    vehicle="tern",
+                    path=SORTIE,
+                    hot_spots=("features[0]",),
+                    length_m=SORTIE.length,
+                    duration_s=SORTIE.length,
+                ),
+            ),
+            treated_share=(1.0,),
+            makespan_s=SORTIE.length,
+        ),
         DecomposeRequest(free=SPACE.free, spacing_m=20.0),
         DECOMPOSITION,
         PathRequest(
@@ -203,6 +231,11 @@ INNER = (
     HeadingScore,
     WeightedArea,
     SpacingStep,
+    Vehicle,
+    HotSpot,
+    Share,
+    Sortie,
+    LeftSpot,
     Variogram,
     Track,
     Conformance,
@@ -283,6 +316,7 @@ def _layers() -> Iterator[str]:
 def _closed_sets() -> str:
     sets: tuple[type[enum.StrEnum], ...] = (
         Method,
+        Role,
         CriticalKind,
         VariogramModel,
         MissionState,

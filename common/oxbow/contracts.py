@@ -21,11 +21,14 @@ from shapely import LineString, Polygon
 from oxbow.errors import ErrorReply, InvalidMission
 
 __all__ = [
+    "ASSIGN",
     "CERTIFY",
     "CONTOUR",
     "DECOMPOSE",
     "PATH",
     "STAGES",
+    "AssignRequest",
+    "Assignment",
     "Cell",
     "Certificate",
     "CertifyRequest",
@@ -40,6 +43,8 @@ __all__ = [
     "FloatArray",
     "FreeSpace",
     "HeadingScore",
+    "HotSpot",
+    "LeftSpot",
     "Measures",
     "Message",
     "Method",
@@ -49,9 +54,14 @@ __all__ = [
     "PathPlan",
     "PathRequest",
     "Place",
+    "Role",
+    "Share",
+    "Sortie",
     "SpacingStep",
+    "Track",
     "Variogram",
     "VariogramModel",
+    "Vehicle",
     "WeightedArea",
 ]
 
@@ -667,7 +677,7 @@ PATH: Endpoint[PathRequest, PathPlan] = Endpoint("path", PathRequest, PathPlan)
 ASSIGN: Endpoint[AssignRequest, Assignment] = Endpoint("assignment", AssignRequest, Assignment)
 CERTIFY: Endpoint[CertifyRequest, Certificate] = Endpoint("certificate", CertifyRequest, Certificate)
 
-STAGES: tuple[Endpoint[Any, Any], ...] = (CONTOUR, DECOMPOSE, PATH, CERTIFY)
+STAGES: tuple[Endpoint[Any, Any], ...] = (CONTOUR, ASSIGN, DECOMPOSE, PATH, CERTIFY)
 
 
 INTROSPECTION = ("ping", "info", "stats", "schema")

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-import shapely
-from shapely import LineString, Point, Polygon
+from shapely import LineString
 
 from oxbow.contracts import (
     Assignment,
     Certificate,
     DroppedPart,
-    FreeSpace,
     Place,
     Role,
     Vehicle,
@@ -23,13 +21,10 @@ from oxbow.frame import Position
 from oxbow.mission import Mission
 from oxbow.vehicles import GivenVehicle
 
-__all__ = ["Member", "TeamPlan", "VehiclePlan", "members", "share_space"]
+__all__ = ["Member", "TeamPlan", "VehiclePlan", "members"]
 
 Locate = Callable[[str, Position], Place]
 """Brings a position to the plane; the text is its field's name, for errors."""
-
-CORRIDOR = 0.1
-"""Half the width of the way over land to a point ashore, as a share of its length."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +51,10 @@ class Member:
         """Whether the Mission File names its vehicles."""
         return "LaunchPoint" in self.fields
 
+    def told(self, warning: str) -> str:
+        """A warning, and which vehicle it is about."""
+        return f"{self.vehicle.name}: {warning}" if self.is_named else warning
+
     @contextmanager
     def named(self) -> Iterator[None]:
         """Say of errors which field of the Mission File they are about, and which vehicle it is."""
@@ -79,6 +78,8 @@ class VehiclePlan:
         Of a survey: direction and spacing of its legs, and the area of the vehicle's share of the free space.
     hot_spots
         Of a treatment: what it treats, in order.
+    dropped, warnings
+        What the path leaves out, and what is to be known of it.
     """
 
     member: Member
@@ -87,6 +88,8 @@ class VehiclePlan:
     spacing_m: float | None = None
     area_m2: float | None = None
     hot_spots: tuple[str, ...] = ()
+    dropped: tuple[DroppedPart, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -106,8 +109,17 @@ class TeamPlan:
     vehicles: tuple[VehiclePlan, ...]
     certificate: Certificate
     assignment: Assignment | None = None
-    dropped: tuple[DroppedPart, ...] = ()
-    warnings: tuple[str, ...] = ()
+
+    @property
+    def dropped(self) -> tuple[DroppedPart, ...]:
+        """What the paths leave out."""
+        return tuple(part for plan in self.vehicles for part in plan.dropped)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be known of the paths; about which vehicle, where the Mission File names its vehicles."""
+        of_all = () if self.assignment is None else self.assignment.warnings
+        return of_all + tuple(plan.member.told(text) for plan in self.vehicles for text in plan.warnings)
 
 
 def members(mission: Mission, locate: Locate) -> tuple[Member, ...]:
@@ -152,33 +164,3 @@ def _member(
         recovery=locate(names[1], recovery),
     )
     return Member(vehicle, start, recovery, fields)
-
-
-def share_space(share: Polygon, space: FreeSpace, ends: Sequence[Place], safety_m: float) -> FreeSpace:
-    """The space of a vehicle that covers a share of the free space, and may cross all of it on its legs.
-
-    Legs are long, and keep to the free space: nearer to the shore, only the surroundings of their ends may be
-    crossed which the certificate excuses (twice the safety distance, and one and a half times the way to the free
-    space). Over land, a leg runs to the nearest water that is free.
-    """
-    ways = [space.free, *(way for place in ends for way in _ways_to(Point(place), space, safety_m))]
-    parts = shapely.get_parts(shapely.union_all(ways))
-    within = max(parts, key=lambda part: part.area)
-    return FreeSpace(
-        free=share,
-        water=within,
-        tolerance_m=space.tolerance_m,
-        compression=space.compression,
-        dropped=space.dropped,
-    )
-
-
-def _ways_to(point: Point, space: FreeSpace, safety_m: float) -> Iterator[Polygon]:
-    """What is added to the free space so that a point may be reached from it."""
-    straight = shapely.shortest_line(point, space.free)
-    if straight.length == 0.0:
-        return
-    if not space.water.covers(point):
-        yield straight.buffer(CORRIDOR * straight.length)
-    radius_m = 2.0 * safety_m + 1.5 * straight.length
-    yield from shapely.get_parts(point.buffer(radius_m).intersection(space.water))

@@ -9,6 +9,7 @@ from typing import Protocol, TypeVar
 import msgspec
 from shapely import Polygon
 
+from oxbow.approach import Approach, Harbour
 from oxbow.completion import completed
 from oxbow.contracts import (
     ASSIGN,
@@ -32,7 +33,7 @@ from oxbow.contracts import (
     Track,
 )
 from oxbow.errors import Infeasible
-from oxbow.fleet import Member, TeamPlan, VehiclePlan, share_space
+from oxbow.fleet import Member, TeamPlan, VehiclePlan
 from oxbow.mission import Mission, PlanOptions
 from oxbow.site import Site
 
@@ -104,35 +105,16 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
 def survey(task: Task, team: Sequence[Member]) -> TeamPlan:
     """Cover the free space: one vehicle all of it, several a share each."""
     if len(team) == 1:
-        assignment, spaces, waters_m2 = None, [task.space], [task.site.area_m2]
-    else:
-        assignment = _shared(task, team)
-        areas = {share.vehicle: share.area for share in assignment.shares}
-        spaces = [_share_space(task, member, areas[member.vehicle.name]) for member in team]
-        waters_m2 = [space.free.area for space in spaces]
-    vehicles, paths = [], []
-    for member, space, water_m2 in zip(team, spaces, waters_m2, strict=True):
-        with member.named():
-            decomposition = _decomposed(task, member, space, water_m2)
-            path = _path(task, member, space, decomposition)
-        paths.append(path)
-        vehicles.append(
-            VehiclePlan(
-                member=member,
-                path=path.path,
-                heading_rad=decomposition.heading_rad,
-                spacing_m=path.spacing_m,
-                area_m2=space.free.area,
-            )
-        )
-    return TeamPlan(
-        vehicles=tuple(vehicles),
-        certificate=_certified(task, vehicles),
-        assignment=assignment,
-        dropped=tuple(part for path in paths for part in path.dropped),
-        warnings=(() if assignment is None else assignment.warnings)
-        + tuple(_named(member, text) for member, path in zip(team, paths, strict=True) for text in path.warnings),
-    )
+        (member,) = team
+        vehicle = member.vehicle
+        whole = Approach(task.space, vehicle.start, vehicle.recovery)
+        alone = (_covered(task, member, whole, task.site.area_m2),)
+        return TeamPlan(alone, _certified(task, alone))
+    assignment = _shared(task, team)
+    areas = {share.vehicle: share.area for share in assignment.shares}
+    harbour = Harbour(task.space, task.site.nominal_spacing_m)
+    vehicles = tuple(_shared_part(task, member, harbour, areas[member.vehicle.name]) for member in team)
+    return TeamPlan(vehicles, _certified(task, vehicles), assignment)
 
 
 def treatment(task: Task) -> TeamPlan:
@@ -151,18 +133,13 @@ def treatment(task: Task) -> TeamPlan:
     if not assignment.sorties:
         reasons = "; ".join(f"{left.hot_spot}: {left.reason}" for left in assignment.left)
         raise Infeasible(f"has no hot spot that can be treated ({reasons})", where="PriorModel")
-    vehicles = [
+    vehicles = tuple(
         VehiclePlan(member=team[sortie.vehicle], path=sortie.path, hot_spots=sortie.hot_spots)
         for sortie in assignment.sorties
-    ]
+    )
     treated = {name for sortie in assignment.sorties for name in sortie.hot_spots}
     areas = tuple(spot.area for spot in task.site.hot_spots if spot.name in treated)
-    return TeamPlan(
-        vehicles=tuple(vehicles),
-        certificate=_certified(task, vehicles, areas),
-        assignment=assignment,
-        warnings=assignment.warnings,
-    )
+    return TeamPlan(vehicles, _certified(task, vehicles, areas), assignment)
 
 
 def expected_calls(mission: Mission) -> int:
@@ -186,28 +163,48 @@ def _shared(task: Task, team: Sequence[Member]) -> Assignment:
     return task.call(ASSIGN, request)
 
 
-def _share_space(task: Task, member: Member, share: Polygon) -> FreeSpace:
-    ends = (member.vehicle.start, member.vehicle.recovery)
-    return share_space(share, task.space, ends, task.mission.safety_m)
+def _shared_part(task: Task, member: Member, harbour: Harbour, share: Polygon) -> VehiclePlan:
+    with member.named():
+        approach = harbour.approach(share, member.vehicle)
+    return _covered(task, member, approach, share.area)
 
 
-def _decomposed(task: Task, member: Member, space: FreeSpace, water_m2: float) -> Decomposition:
-    spacing_m = max(water_m2 / member.vehicle.length_m, task.mission.minimal_spatial_rate_m or 0.0)
-    heading_rad = task.options.heading_rad
-    return task.call(DECOMPOSE, DecomposeRequest(free=space.free, spacing_m=spacing_m, heading_rad=heading_rad))
+def _covered(task: Task, member: Member, approach: Approach, water_m2: float) -> VehiclePlan:
+    """A path over all of a space, with the legs to it."""
+    with member.named():
+        length_m = approach.length_m(member.vehicle.length_m)
+        decomposition = _decomposed(task, approach.space, water_m2 / length_m)
+        plan = _path(task, approach, decomposition, length_m)
+        return VehiclePlan(
+            member=member,
+            path=approach.joined(plan.path),
+            heading_rad=decomposition.heading_rad,
+            spacing_m=plan.spacing_m,
+            area_m2=approach.space.free.area,
+            dropped=plan.dropped,
+            warnings=plan.warnings,
+        )
 
 
-def _path(task: Task, member: Member, space: FreeSpace, decomposition: Decomposition) -> PathPlan:
+def _decomposed(task: Task, space: FreeSpace, spacing_m: float) -> Decomposition:
+    least_m = task.mission.minimal_spatial_rate_m or 0.0
+    request = DecomposeRequest(
+        free=space.free, spacing_m=max(spacing_m, least_m), heading_rad=task.options.heading_rad
+    )
+    return task.call(DECOMPOSE, request)
+
+
+def _path(task: Task, approach: Approach, decomposition: Decomposition, length_m: float) -> PathPlan:
     options = task.options
     return task.call(
         PATH,
         PathRequest(
             method=options.method,
-            space=space,
+            space=approach.space,
             decomposition=decomposition,
-            launch=member.vehicle.start,
-            recovery=member.vehicle.recovery,
-            length_m=member.vehicle.length_m,
+            launch=approach.launch,
+            recovery=approach.recovery,
+            length_m=length_m,
             min_spacing_m=task.mission.minimal_spatial_rate_m or 0.0,
             seed=options.seed,
             weighted_areas=task.site.weighted_areas,
@@ -237,8 +234,3 @@ def _certified(task: Task, vehicles: Sequence[VehiclePlan], areas: tuple[Polygon
 def _track(plan: VehiclePlan) -> Track:
     vehicle = plan.member.vehicle
     return Track(path=plan.path, launch=vehicle.start, recovery=vehicle.recovery, speed_mps=vehicle.speed_mps)
-
-
-def _named(member: Member, warning: str) -> str:
-    """A warning, with the vehicle that it is about where the mission names its vehicles."""
-    return f"{member.vehicle.name}: {warning}" if member.is_named else warning

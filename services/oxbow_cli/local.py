@@ -1,4 +1,4 @@
-"""The four stages in this process: what `--local` plans with."""
+"""The stages in this process: what `--local` plans with."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ __all__ = ["local_call"]
 
 def local_call(show: Show = discard) -> LocalCall:
     """A call that runs each stage's handler here; the algorithms' imports are paid at this point."""
+    import oxbow_assignment.service  # noqa: PLC0415
     import oxbow_certificate.service  # noqa: PLC0415
     import oxbow_contour.service  # noqa: PLC0415
     import oxbow_decomposition.service  # noqa: PLC0415
@@ -17,6 +18,7 @@ def local_call(show: Show = discard) -> LocalCall:
 
     handlers: dict[str, Handler] = {
         "contour": oxbow_contour.service.handle,
+        "assignment": oxbow_assignment.service.handle,
         "decomposition": oxbow_decomposition.service.handle,
         "path": oxbow_path.service.handle,
         "certificate": oxbow_certificate.service.handle,

@@ -1,0 +1,259 @@
+"""How a vehicle gets to its share of the free space, and home: legs through water that others survey.
+
+A share is planned as a lake of its own. A vehicle whose start lies elsewhere enters it at a *gate* and leaves it
+there: its legs keep to the free space, and, like ships, to one side, so that the way home runs beside the way out
+and the whole path stays simple.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import shapely
+from msgspec import structs
+from shapely import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.ops import substring
+
+from oxbow.contracts import FloatArray, FreeSpace, Place, Vehicle
+from oxbow.errors import Infeasible
+from oxbow.route import RouteMethod, Router, make_router
+
+__all__ = ["Approach", "Harbour"]
+
+APART = 0.1
+"""Distance of the way out from the way home at first, as a share of the nominal spacing."""
+HALVINGS = 8
+"""How often that distance may be halved until both ways fit."""
+GATES = 48
+"""Places of a share's rim that may be its gate, at most about."""
+INSIDE_M = 1e-3
+"""How far inside its share a gate lies: enough that rounding does not move it out."""
+OFF_M = 1e-2
+"""A leg that strays so little from the water stays in it: what the certificate takes for the shore."""
+SPARE = 1.001
+"""Legs are so many times as long as their middle lines, at most, but for the ends."""
+
+
+@dataclass(frozen=True)
+class Approach:
+    """What is to be planned in a share, and the legs that the plan is joined to.
+
+    Parameters
+    ----------
+    space
+        The share, as a space of its own.
+    launch, recovery
+        Where the path in the share begins and ends: the vehicle's own places, or the gate.
+    out, home : ndarray of shape (n, 2)
+        Middle lines of the legs, from the start to the gate and from the gate to the recovery; None where the
+        place is reached without crossing other shares.
+    apart_m
+        How far legs may run beside their middle lines.
+    water
+        What legs keep to.
+    """
+
+    space: FreeSpace
+    launch: Place
+    recovery: Place
+    out: FloatArray | None = None
+    home: FloatArray | None = None
+    apart_m: float = 0.0
+    water: Polygon = field(default_factory=Polygon)
+
+    def length_m(self, range_m: float) -> float:
+        """What the legs leave of a range for the share.
+
+        Raises
+        ------
+        Infeasible
+            Nothing: the legs alone are longer.
+        """
+        legs = [LineString(leg) for leg in (self.out, self.home) if leg is not None]
+        legs_m = sum(SPARE * leg.length + 6.0 * self.apart_m for leg in legs)
+        if legs_m >= range_m:
+            raise Infeasible(
+                f"is {range_m:.0f} m; the way to the vehicle's share and home is {legs_m:.0f} m", "Master_length"
+            )
+        return range_m - legs_m
+
+    def joined(self, path: LineString) -> LineString:
+        """A path in the share, with its legs: from the vehicle's start to its recovery.
+
+        Raises
+        ------
+        Infeasible
+            The water is too narrow for both legs.
+        """
+        if self.out is None and self.home is None:
+            return path
+        for candidate in self._candidates(shapely.get_coordinates(path)):
+            line = candidate.line
+            if line.is_simple and all(map(self._keeps_to_water, candidate.legs)):
+                return line
+        raise Infeasible("is reached only by water too narrow to come back beside the way out", "LaunchPoint")
+
+    def _candidates(self, path: FloatArray) -> Iterator[_Candidate]:
+        """Legs on either side, with the path either way round, ever nearer to each other."""
+        if self.out is None or self.home is None:
+            yield _Candidate(self.out, path, self.home)
+            return
+        line = LineString(path)
+        for apart_m in self.apart_m * 0.5 ** np.arange(HALVINGS):
+            inner = shapely.get_coordinates(substring(line, 2.0 * apart_m, line.length - 2.0 * apart_m))
+            for side, way in itertools.product((1.0, -1.0), (inner, inner[::-1])):
+                out = np.vstack([self.out[:1], _beside(self.out[1:], side * apart_m)])
+                home = np.vstack([_beside(self.home[:-1], side * apart_m), self.home[-1:]])
+                yield _Candidate(out, way, home)
+
+    def _keeps_to_water(self, leg: LineString) -> bool:
+        """Whether a leg leaves the water at most near the straight stretches to the vehicle's own places."""
+        legs = (self.out, None if self.home is None else self.home[::-1])
+        ends = [LineString(leg[:2]) for leg in legs if leg is not None]
+        allowed = shapely.union_all([self.water, *(end.buffer(self.apart_m) for end in ends)])
+        return bool(leg.difference(allowed.buffer(OFF_M)).length == 0.0)
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """A path in a share, and its legs where it has them."""
+
+    out: FloatArray | None
+    way: FloatArray
+    home: FloatArray | None
+
+    @property
+    def line(self) -> LineString:
+        return LineString(np.vstack([part for part in (self.out, self.way, self.home) if part is not None]))
+
+    @property
+    def legs(self) -> list[LineString]:
+        """Each with the step from or to the path."""
+        legs = [] if self.out is None else [np.vstack([self.out, self.way[:1]])]
+        legs += [] if self.home is None else [np.vstack([self.way[-1:], self.home])]
+        return [LineString(leg) for leg in legs]
+
+
+class Harbour:
+    """Finds the approaches of a team in one free space.
+
+    Parameters
+    ----------
+    space
+        All of the free space.
+    spacing_m
+        The nominal spacing of the paths.
+    """
+
+    def __init__(self, space: FreeSpace, spacing_m: float) -> None:
+        self.space = space
+        self._lanes = [_Lanes(space.free, APART * spacing_m * 0.5**step) for step in range(HALVINGS)]
+
+    def approach(self, share: Polygon, vehicle: Vehicle) -> Approach:
+        """The approach of a vehicle to its share.
+
+        Raises
+        ------
+        Infeasible
+            No way through the free space leads there.
+        """
+        start, recovery = vehicle.start, vehicle.recovery
+        out_is_remote, home_is_remote = (self._is_remote(share, place) for place in (start, recovery))
+        space = structs.replace(
+            self.space, free=share, water=share if out_is_remote and home_is_remote else self.space.water
+        )
+        if not (out_is_remote or home_is_remote):
+            return Approach(space, start, recovery)
+        found = self._to_gate(share, start if out_is_remote else recovery)
+        lanes, way = found.lanes, found.line
+        gate: Place = (float(way[-1, 0]), float(way[-1, 1]))
+        home = (way if recovery == start or not out_is_remote else lanes.way(recovery, gate))[::-1]
+        return Approach(
+            space=space,
+            launch=gate if out_is_remote else start,
+            recovery=gate if home_is_remote else recovery,
+            water=self.space.free,
+            out=way if out_is_remote else None,
+            home=home if home_is_remote else None,
+            apart_m=lanes.apart_m,
+        )
+
+    def _is_remote(self, share: Polygon, place: Place) -> bool:
+        """Whether a place is nearer to other free water than to the share."""
+        point = Point(place)
+        return bool(share.distance(point) > self.space.free.distance(point) + INSIDE_M)
+
+    def _to_gate(self, share: Polygon, place: Place) -> _Way:
+        """The middle line of a leg from a place to a share, in lanes as wide as the water allows."""
+        for lanes in self._lanes:
+            line = lanes.to_gate(share, place)
+            if line is not None:
+                return _Way(lanes, line)
+        raise Infeasible("lies in water from which no way leads to the vehicle's share", "LaunchPoint")
+
+
+@dataclass(frozen=True)
+class _Lanes:
+    """The middle of the free space: far enough from its rim for a leg on either side."""
+
+    free: Polygon
+    apart_m: float
+
+    @cached_property
+    def _middle(self) -> BaseGeometry:
+        return self.free.buffer(-2.0 * self.apart_m, quad_segs=2)
+
+    @cached_property
+    def _router(self) -> Router:
+        return make_router(RouteMethod.VISIBILITY, self.free.buffer(-1.5 * self.apart_m, quad_segs=2))
+
+    def way(self, place: Place, goal: Place | FloatArray) -> FloatArray:
+        """The middle line from a place, ashore or not, to another in the middle of the free space."""
+        return np.vstack([place, self._router.route(self._entry(place), goal).polyline])
+
+    def to_gate(self, share: Polygon, place: Place) -> FloatArray | None:
+        """The middle line from a place to the nearest gate of a share; None where no way leads there."""
+        reached = share.buffer(-INSIDE_M, join_style="mitre")
+        gates = _edge_middles(share.buffer(-2.0 * INSIDE_M, join_style="mitre").intersection(self._middle), GATES)
+        if self._middle.is_empty or not len(gates):
+            return None
+        distances = self._router.distances(np.vstack([self._entry(place), gates]))[0, 1:]
+        if not np.isfinite(distances).any():
+            return None
+        way = self.way(place, gates[np.argmin(distances)])
+        line = LineString(way[1:])
+        within = shapely.points(shapely.get_coordinates(line.intersection(reached)))
+        inshore = substring(line, 0.0, float(shapely.line_locate_point(line, within).min()))
+        return np.vstack([place, shapely.get_coordinates(inshore)])
+
+    def _entry(self, place: Place) -> FloatArray:
+        """Where the middle of the free space is nearest to a place."""
+        return np.asarray(shapely.get_coordinates(shapely.shortest_line(self._middle, Point(place)))[0])
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A middle line (n, 2) from a place to a gate, and the lanes that it runs in."""
+
+    lanes: _Lanes
+    line: FloatArray
+
+
+def _edge_middles(area: BaseGeometry, most: int) -> FloatArray:
+    """Places (n, 2) in the middle of an area's longest edges: a path may begin, end and run along them."""
+    xy, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(area)), return_index=True)
+    edges = np.stack([xy[:-1], xy[1:]], axis=1)[ring[:-1] == ring[1:]]
+    longest = np.argsort(-np.hypot(*(edges[:, 1] - edges[:, 0]).T), kind="stable")[:most]
+    return np.asarray(edges[longest].mean(axis=1))
+
+
+def _beside(leg: FloatArray, apart_m: float) -> FloatArray:
+    """A leg moved to its right; nothing, where it is a place only."""
+    if len(leg) < 2:
+        return leg[:0]
+    return np.asarray(shapely.get_coordinates(shapely.offset_curve(LineString(leg), -apart_m, quad_segs=2)))
