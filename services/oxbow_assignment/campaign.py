@@ -14,7 +14,7 @@ from oxbow.route import RouteMethod, make_router
 from oxbow_assignment.division import Division, divided
 from oxbow_assignment.fleet import Fleet
 from oxbow_assignment.sorties import Journey, Schedule, scheduled
-from oxbow_assignment.spots import require_apart, waters
+from oxbow_assignment.spots import require_treatable, waters
 from oxbow_assignment.treatment import Treatment, treatment_of
 
 __all__ = ["Campaign", "plan_campaign"]
@@ -94,17 +94,18 @@ def plan_campaign(
     Raises
     ------
     InvalidMission
-        Hot spots overlap or have one name; there is no slave; the swath is far too small.
+        Hot spots overlap, have one name or no value; there is no slave; the swath is far too small.
     Infeasible
         A slave's range does not suffice to reach the free space and go home.
     """
-    require_apart(spots)
+    require_treatable(spots)
     shapely.prepare(free)
-    router = make_router(RouteMethod.VISIBILITY, free)
-    fleet = Fleet.of(slaves, free, router)
+    fleet = Fleet.of(slaves, free, make_router(RouteMethod.VISIBILITY, free))
     found = tuple(waters(spots, free))
+    # From pass to pass there is next to nothing to choose: the funnel's way is the shortest, and found at once.
+    between_passes = make_router(RouteMethod.FUNNEL, free)
     treatments = tuple(
-        treatment_of(spot, water, free, router, swath_m)
+        treatment_of(spot, water, free, between_passes, swath_m)
         for spot, water in zip(spots, found, strict=True)
         if not water.is_empty
     )

@@ -11,6 +11,7 @@ import numpy as np
 from shapely import LineString
 from shapely.ops import substring
 
+from oxbow.errors import Infeasible
 from oxbow_assignment.fleet import Fleet
 from oxbow_assignment.treatment import Treatment
 
@@ -18,6 +19,9 @@ __all__ = ["Division", "OutOfReach", "Part", "divided"]
 
 LEAST_SPARE = 0.125
 """The shortest parts of one division, as a share of the range: from farther away, parts are divided further."""
+
+MOST_PARTS = 500
+"""More parts than these are a slip in a range or a swath: nobody puts out to sea so often."""
 
 LEAST_PART = 0.05
 """The shortest stretch that is divided further, as a share of the range: for less, nobody puts out to sea."""
@@ -77,6 +81,11 @@ def divided(treatments: Sequence[Treatment], fleet: Fleet) -> Division:
     A part fits where its length and the way to it and home do, either way round on average. One that does not fit
     is divided evenly into as many as its distance asks for, and so on. On a line the way there and home changes by
     no more than twice what is travelled: where even that leaves nothing within reach, nothing is divided further.
+
+    Raises
+    ------
+    Infeasible
+        It would take hundreds of sorties.
     """
     pieces = [
         Part(number, 0.0, 1.0, treatment.line, treatment.spot.value) for number, treatment in enumerate(treatments)
@@ -98,6 +107,13 @@ def divided(treatments: Sequence[Treatment], fleet: Fleet) -> Division:
                 shortest_m = max(float(own[slave]), LEAST_SPARE * float(fleet.lengths_m[slave]))
                 longer += _evenly(piece, max(2, math.ceil(length_m / shortest_m)))
         pieces = longer
+    if len(parts) > MOST_PARTS:
+        total_m = sum(treatment.line.length for treatment in treatments)
+        raise Infeasible(
+            f"take {total_m / 1000:.0f} km of passes, in {len(parts)} parts that fit a sortie; expected at most"
+            f" {MOST_PARTS}: a wider swath, or vehicles of longer range",
+            where="hot_spots",
+        )
     parts.sort(key=lambda part: (part.treatment, part.since))
     return Division(tuple(parts), tuple(out_of_reach))
 

@@ -20,10 +20,13 @@ LEAST_SAVED_S = 1e-6
 """Savings below this are rounding."""
 
 
-def trimmed(problem: Problem, vehicle: int, path: IntArray, *, held: int = 0) -> IntArray:
+def trimmed(
+    problem: Problem, vehicle: int, path: IntArray, *, held: int = 0, wanted: np.intp | None = None
+) -> IntArray:
     """A path within its vehicle's range, of targets that it may visit.
 
-    While it is too long, the target goes that saves most metres for its value; the first `held` targets go last.
+    While it is too long, the target goes that saves most metres for its value; a `wanted` target goes after all
+    others but the first `held`, which go last.
     """
     inner = path[1:-1]
     path = np.concatenate([path[:1], inner[problem.can_visit[vehicle, inner]], path[-1:]])
@@ -31,6 +34,7 @@ def trimmed(problem: Problem, vehicle: int, path: IntArray, *, held: int = 0) ->
         before, at, after = path[:-2], path[1:-1], path[2:]
         saved = problem.finite[before, at] + problem.finite[at, after] - problem.finite[before, after]
         worth = saved / problem.values[at]
+        worth[at == wanted] = np.finfo(float).min
         worth[:held] = -np.inf
         path = np.delete(path, 1 + int(worth.argmax()))
     return path
@@ -65,7 +69,7 @@ def inserted(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -
 def traded(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -> list[IntArray]:
     """The paths with targets that nobody visits put in the place of others, where that is worth it.
 
-    A target is put in although it does not fit, and the path is trimmed: that stays if the path then serves more
+    A target is put in although it does not fit, and others are trimmed: that stays if the path then serves more
     value, or as much in less time. The first `held` targets of each path stay.
     """
     paths = list(paths)
@@ -96,7 +100,7 @@ def _trade(problem: Problem, vehicle: int, path: IntArray, held: int, target: np
     before, after = path[held:-1], path[held + 1 :]
     detours = problem.finite[before, target] + problem.finite[target, after] - problem.finite[before, after]
     longer = np.insert(path, held + 1 + int(detours.argmin()), target)
-    traded = trimmed(problem, vehicle, longer, held=held)
+    traded = trimmed(problem, vehicle, longer, held=held, wanted=target)
     added_m = tour_length(problem, traded) - tour_length(problem, path)
     value = problem.values[traded[1:-1]].sum() - problem.values[path[1:-1]].sum()
     return _Trade(vehicle, traded, float(value), added_m / problem.vehicles[vehicle].speed_mps)

@@ -95,16 +95,16 @@ def _headings(region: BaseGeometry) -> FloatArray:
 def _stripes(region: BaseGeometry, free: Polygon, swath_m: float, heading: float) -> list[LineString]:
     """One pass along the middle of each band, wherever the band holds water of the region."""
     turn = np.array([[math.cos(heading), -math.sin(heading)], [math.sin(heading), math.cos(heading)]])
-    upright = shapely.transform(region, lambda xy: xy @ turn)
-    x0, y0, x1, y1 = upright.bounds
+    x0, y0, x1, y1 = _bounds(region, turn)
     count = max(1, math.ceil((y1 - y0) / swath_m - ROUNDING))
     floors = y0 + (y1 - y0) / count * np.arange(count)
     ones = np.ones(count)
     bands = shapely.box((x0 - 1.0) * ones, floors, (x1 + 1.0) * ones, floors + (y1 - y0) / count)
-    shapely.prepare(upright)
-    pieces, band = shapely.get_parts(shapely.intersection(upright, bands), return_index=True)
+    # The bands turn, and not the region: rings of it that touch would be no valid polygon after rounding.
+    bands = shapely.transform(bands, lambda xy: xy @ turn.T)
+    pieces, band = shapely.get_parts(shapely.intersection(region, bands), return_index=True)
     flat = shapely.area(pieces) == 0.0
-    low, _, high, _ = shapely.bounds(pieces[~flat]).T
+    low, high = np.array([_bounds(piece, turn)[[0, 2]] for piece in pieces[~flat]]).T
     ends = np.array(list(_merged(band[~flat], low, high)))
     middles = floors[ends[:, 0].astype(int)] + (y1 - y0) / count / 2
     places = np.stack([np.column_stack([ends[:, k], middles]) for k in (1, 2)], axis=1) @ turn.T
@@ -112,6 +112,12 @@ def _stripes(region: BaseGeometry, free: Polygon, swath_m: float, heading: float
     clear = shapely.covers(free, lines)
     lines[~clear] = shapely.intersection(lines[~clear], free)
     return [part for line in lines for part in _lines(line)]
+
+
+def _bounds(geometry: BaseGeometry, turn: FloatArray) -> FloatArray:
+    """Least x and y and greatest x and y of a geometry in a turned frame."""
+    points = shapely.get_coordinates(geometry) @ turn
+    return np.concatenate([points.min(axis=0), points.max(axis=0)])
 
 
 def _merged(band: IntArray, low: FloatArray, high: FloatArray) -> Iterator[tuple[int, float, float]]:

@@ -23,7 +23,7 @@ __all__ = ["Journey", "Schedule", "scheduled"]
 ROUNDING_M = 1e-6
 """A path this near to the free space is in it."""
 
-JOINT_MOST = 15
+JOINT_MOST = 30
 """More parts than these are not given to the joint optimiser: it would take longer than all else."""
 
 PATIENCE = 100
@@ -117,7 +117,7 @@ def _problem(parts: Sequence[Part], fleet: Fleet, ways: Ways, left: IntArray) ->
         vehicles=fleet.cautious_slaves,
         distances=distances,
         objective=Objective.MAKESPAN,
-        values=np.array([parts[number].value for number in left.tolist()]),
+        values=np.array([parts[number].value for number in left.tolist()], dtype=float),
     )
 
 

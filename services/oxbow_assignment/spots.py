@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from oxbow.contracts import HotSpot
 from oxbow.errors import InvalidMission
 
-__all__ = ["OVERLAP", "require_apart", "waters"]
+__all__ = ["OVERLAP", "require_treatable", "waters"]
 
 OVERLAP = 1e-3
 """Share of the smaller of two hot spots that both may have in common: contours are rounded."""
@@ -21,18 +21,25 @@ LEAST = 1e-6
 """A smaller share of a hot spot in the free space is nothing."""
 
 
-def require_apart(spots: Sequence[HotSpot]) -> None:
-    """Check that names tell hot spots apart, and that no two overlap: what is treated is treated once.
+def require_treatable(spots: Sequence[HotSpot]) -> None:
+    """Check that names tell hot spots apart, that all are worth something, and that no two overlap.
 
     Raises
     ------
     InvalidMission
-        Names both hot spots, and the area that they have in common.
+        Names the hot spots, and the value, or the area that both have in common.
     """
     names = [spot.name for spot in spots]
     for name in names:
         if names.count(name) > 1:
             raise InvalidMission(f"has {name!r} {names.count(name)} times; expected once", where="hot_spots")
+    for spot in spots:
+        if spot.value <= 0.0:
+            raise InvalidMission(
+                f"of hot spot {spot.name!r} is {spot.value:g}; expected > 0: where not all can be treated, value"
+                " per metre comes first",
+                where="value",
+            )
     areas = np.array([spot.area for spot in spots], dtype=object)
     one, other = STRtree(areas).query(areas, predicate="intersects")
     one, other = one[one < other], other[one < other]

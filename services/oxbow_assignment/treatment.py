@@ -26,7 +26,7 @@ COVERED = 0.995
 """Share of a hot spot's water that its passes are to treat."""
 
 ROUNDS = 8
-"""How often passes are added for what was missed; two suffice but for the most ragged shapes."""
+"""How often passes are added for what was missed; three suffice but for the most ragged shapes."""
 
 MOST_PASSES = 2_000
 """More passes than these over one hot spot are a slip in `swath_m`, not a treatment."""

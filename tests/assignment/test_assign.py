@@ -295,3 +295,12 @@ def test_assignments_that_serve_different_value_have_no_gap():
     nobody = assignment_of(scene, [scene.path(0, ()), scene.path(1, ())])
     assert joint.gap_to(nobody, assign(scene).assignment).relative is None
     assert joint.gap_to(nobody, nobody).relative == 0.0
+
+
+def test_one_target_may_take_the_place_of_several_worth_less():
+    scene = problem(
+        [(100.0, 0.0), (110.0, 0.0), (-400.0, 0.0)],
+        [vehicle(length_m=810.0)],
+        values=np.array([1.0, 1.0, 3.0]),
+    )
+    assert assign(scene).assignment.tours[0].targets == (2,)
