@@ -28,7 +28,7 @@ COVERED = 0.995
 ROUNDS = 8
 """How often passes are added for what was missed; three suffice but for the most ragged shapes."""
 
-MOST_PASSES = 2_000
+MOST_PASSES = 1_000
 """More passes than these over one hot spot are a slip in `swath_m`, not a treatment."""
 
 NEAR = 8
@@ -82,13 +82,9 @@ def treatment_of(spot: HotSpot, water: BaseGeometry, free: Polygon, router: Rout
     InvalidMission
         The swath is so small that the hot spot would take thousands of passes.
     """
-    if (needed := passes_needed(water, swath_m)) > MOST_PASSES:
-        raise InvalidMission(
-            f"is {swath_m:g} m: hot spot {spot.name!r} would take {needed} passes; expected"
-            f" {swath_m * needed / MOST_PASSES:.3g} m or more",
-            where="swath_m",
-        )
+    _require_few(passes_needed(water, swath_m), spot, swath_m)
     more = parallel_passes(water, free, swath_m) or _further_passes(Polygon(), water, free, swath_m)
+    _require_few(len(more), spot, swath_m)
     passes: list[LineString] = []
     for _ in range(ROUNDS):
         passes = ordered([*passes, *more], free)
@@ -97,6 +93,15 @@ def treatment_of(spot: HotSpot, water: BaseGeometry, free: Polygon, router: Rout
         if not more:
             break
     return Treatment(spot, water, tuple(passes), line)
+
+
+def _require_few(passes: int, spot: HotSpot, swath_m: float) -> None:
+    if passes > MOST_PASSES:
+        raise InvalidMission(
+            f"is {swath_m:g} m: hot spot {spot.name!r} would take {passes} passes; expected"
+            f" {swath_m * passes / MOST_PASSES:.3g} m or more",
+            where="swath_m",
+        )
 
 
 def _further_passes(treated: BaseGeometry, water: BaseGeometry, free: Polygon, swath_m: float) -> list[LineString]:

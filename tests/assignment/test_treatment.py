@@ -111,10 +111,10 @@ def test_the_way_over_a_hot_spot_is_little_longer_than_its_passes():
 
 
 def test_a_swath_far_too_small_is_refused():
-    message = r"swath_m: is 0.001 m: hot spot 'bloom' would take 30000 passes; expected 0.015 m or more"
+    message = r"swath_m: is 0.001 m: hot spot 'bloom' would take 30000 passes; expected 0.03 m or more"
     with pytest.raises(InvalidMission, match=message):
         treatment(box(0, 0, 100, 30), SEA, 0.001)
-    assert 0.015 * MOST_PASSES == 30.0
+    assert 0.03 * MOST_PASSES == 30.0
 
 
 # ----------------------------------------------------------------------------- parts and sorties
