@@ -107,8 +107,8 @@ class Approach:
         for apart_m in self.apart_m * 0.5 ** np.arange(HALVINGS):
             inner = shapely.get_coordinates(substring(line, 2.0 * apart_m, line.length - 2.0 * apart_m))
             for side, way in itertools.product((1.0, -1.0), (inner, inner[::-1])):
-                out = np.vstack([self.out[:1], _beside(self.out[1:], side * apart_m)])
-                home = np.vstack([_beside(self.home[:-1], side * apart_m), self.home[-1:]])
+                out = np.vstack([self.out[:1], _beside(self.out[1:-1], side * apart_m)])
+                home = np.vstack([_beside(self.home[1:-1], side * apart_m), self.home[-1:]])
                 yield _Candidate(out, way, home)
 
     def _keeps_to_water(self, leg: LineString) -> bool:
@@ -172,14 +172,16 @@ class Harbour:
         found = self._to_gate(share, start if out_is_remote else recovery)
         lanes, way = found.lanes, found.line
         gate: Place = (float(way[-1, 0]), float(way[-1, 1]))
-        home = (way if recovery == start or not out_is_remote else lanes.way(recovery, gate))[::-1]
+        home = way
+        if out_is_remote and recovery != start:
+            home = np.vstack([lanes.way(recovery, way[-2]), gate])
         return Approach(
             space=space,
             launch=gate if out_is_remote else start,
             recovery=gate if home_is_remote else recovery,
             water=self.space.free,
             out=way if out_is_remote else None,
-            home=home if home_is_remote else None,
+            home=home[::-1] if home_is_remote else None,
             apart_m=lanes.apart_m,
         )
 
@@ -225,11 +227,12 @@ class _Lanes:
         distances = self._router.distances(np.vstack([self._entry(place), gates]))[0, 1:]
         if not np.isfinite(distances).any():
             return None
-        way = self.way(place, gates[np.argmin(distances)])
-        line = LineString(way[1:])
-        within = shapely.points(shapely.get_coordinates(line.intersection(reached)))
-        inshore = substring(line, 0.0, float(shapely.line_locate_point(line, within).min()))
-        return np.vstack([place, shapely.get_coordinates(inshore)])
+        line = LineString(self.way(place, gates[np.argmin(distances)])[1:])
+        # From where it is near, straight on: one side of a leg that met the rim at a slant would lie in the share.
+        near = shapely.points(shapely.get_coordinates(line.intersection(share.buffer(2.0 * self.apart_m))))
+        far = shapely.get_coordinates(substring(line, 0.0, float(shapely.line_locate_point(line, near).min())))
+        gate = shapely.get_coordinates(shapely.shortest_line(reached, Point(far[-1])))[0]
+        return np.vstack([place, far, gate])
 
     def _entry(self, place: Place) -> FloatArray:
         """Where the middle of the free space is nearest to a place."""

@@ -92,7 +92,7 @@ def _spots(geometry: BaseGeometry, name: str, value: float, swath_m: float) -> I
 
 
 def _require_apart(spots: Sequence[HotSpot]) -> None:
-    areas = np.array([spot.area for spot in spots])
+    areas = np.array([spot.area for spot in spots], dtype=object)
     one, other = STRtree(areas).query(areas, predicate="intersects")
     one, other = one[one < other], other[one < other]
     shared_m2 = shapely.area(shapely.intersection(areas[one], areas[other]))

@@ -185,7 +185,10 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
     def planned_paths(self) -> tuple[VehiclePath, ...]:
         """The path of every vehicle that has one, under whichever field it stands."""
         own = ((Role.MASTER, self.master_path), (Role.SLAVE, self.slave_path))
-        of_roles = (VehiclePath(name=role.value, role=role, path=path) for role, path in own if path)
+        own_roles = self.mission_type.roles
+        of_roles = (
+            VehiclePath(name=role, role=role, path=path) for role, path in own if path and role in own_roles
+        )
         return (*of_roles, *(self.paths or ()))
 
     @property

@@ -12,11 +12,13 @@ import msgspec
 import numpy as np
 import shapely
 from shapely import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
 
-from oxbow.contracts import FloatArray, Variogram, VariogramModel
+from oxbow.contracts import FloatArray, Role, Variogram, VariogramModel
 from oxbow.frame import Frame, Position
 from oxbow.mission import Bloom, Mission, MissionType, write_mission
 from oxbow.prior import PriorFeature, PriorModel, prior_document
+from oxbow.vehicles import GivenVehicle
 
 FOLDER = Path(__file__).parent
 DECIMALS = 6
@@ -119,6 +121,52 @@ def meander() -> Mission:
     )
 
 
+def fleet() -> Mission:
+    """The lake, shared among three boats: two from the landing stage, a slower one from the arm's end."""
+    frame, water = Frame(lat=46.1, long=1.9), lake()
+    boats = (
+        GivenVehicle(name="heron", role=Role.MASTER, length_m=30_000.0),
+        GivenVehicle(name="grebe", role=Role.MASTER, length_m=30_000.0),
+        GivenVehicle(
+            name="coot",
+            role=Role.MASTER,
+            speed_mps=1.0,
+            length_m=20_000.0,
+            start=positions(frame, np.array([[3600.0, 2300.0]]))[0],
+            recovery=positions(frame, np.array([[3600.0, 2300.0]]))[0],
+        ),
+    )
+    return msgspec.structs.replace(water, vehicles=boats)
+
+
+def treat() -> Mission:
+    """The meander, with three blooms to treat and a place that a swimmer reported, by two boats."""
+    frame, rng = Frame(lat=44.2, long=-0.4), np.random.default_rng(7)
+    places = [(-1060, 150, 45, 34.0), (-30, -900, 50, 41.0), (620, -720, 40, 55.0)]
+    blooms = [
+        PriorFeature(geometry=in_degrees(frame, blob(x, y, radius, rng, 0.3).simplify(2.0)), value=value)
+        for x, y, radius, value in places
+    ]
+    seen = PriorFeature(geometry=in_degrees(frame, Point(1010.0, 350.0)), value=38.0)
+    boats = (
+        GivenVehicle(name="tern", role=Role.SLAVE, length_m=5_000.0),
+        GivenVehicle(name="gull", role=Role.SLAVE, speed_mps=0.8, length_m=9_000.0),
+    )
+    return msgspec.structs.replace(
+        meander(),
+        mission_type=MissionType.TREAT,
+        recovery=None,
+        minimal_spatial_rate_m=None,
+        swath_m=10.0,
+        vehicles=boats,
+        prior_model=PriorModel(features=(*blooms, seen)),
+    )
+
+
+def in_degrees(frame: Frame, shape: BaseGeometry) -> BaseGeometry:
+    return shapely.transform(shape, lambda xy: np.round(frame.to_degrees(xy), DECIMALS))
+
+
 def reservoir() -> bytes:
     """A reservoir in a branched valley, with one island, as GeoJSON."""
     frame, rng = Frame(lat=43.6, long=2.75), np.random.default_rng(3)
@@ -143,9 +191,7 @@ def reservoir_prior() -> bytes:
     prior = PriorModel(
         features=tuple(
             PriorFeature(
-                geometry=shapely.transform(
-                    shape.simplify(5.0), lambda xy: np.round(frame.to_degrees(xy), DECIMALS)
-                ),
+                geometry=in_degrees(frame, shape.simplify(5.0)),
                 weight=weight,
                 value=value,
             )
@@ -159,6 +205,8 @@ def reservoir_prior() -> bytes:
 def main() -> None:
     write_mission(FOLDER / "lake.json", lake())
     write_mission(FOLDER / "meander.json", meander())
+    write_mission(FOLDER / "fleet.json", fleet())
+    write_mission(FOLDER / "treat.json", treat())
     (FOLDER / "reservoir.geojson").write_bytes(reservoir())
     (FOLDER / "reservoir-prior.geojson").write_bytes(reservoir_prior())
 

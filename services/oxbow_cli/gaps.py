@@ -11,11 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from shapely import LineString, MultiPolygon, Polygon
+from shapely import MultiPolygon, Polygon
 
 from oxbow.contracts import CertifyRequest, Place
 from oxbow.mission import Mission
 from oxbow.site import Site
+from oxbow_certificate.axes import Paths
 from oxbow_certificate.certify import Judgement, judge
 from oxbow_certificate.distance import PathDistance
 from oxbow_cli import sheet
@@ -75,7 +76,7 @@ def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     judgement = judge(request)
     figure, axes = sheet.new_sheet(site)
     sheet.draw_site(axes, site, mission.safety_m)
-    _draw_gaps(axes, judgement, request.path)
+    _draw_gaps(axes, judgement)
     _note_worst_gap(axes, judgement)
     _draw_magnified(figure, axes, site, judgement, request)
     sheet.draw_ends(axes, site)
@@ -85,12 +86,13 @@ def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     sheet.save_sheet(figure, path, width_px)
 
 
-def _draw_gaps(axes: Axes, judgement: Judgement, path: LineString) -> None:
-    """The distance, the path, and the disc that the worst gap would hold."""
+def _draw_gaps(axes: Axes, judgement: Judgement) -> None:
+    """The distance, the paths, and the disc that the worst gap would hold."""
     least_radius_m, radius_m = judgement.certificate.least_radius_m, judgement.cover.low_m
-    _draw_distance(axes, judgement.space.judged, path, least_radius_m)
+    _draw_distance(axes, judgement.space.judged, judgement.paths, least_radius_m)
     width = 0.6 * sheet.line_width(axes, 2.0 * least_radius_m)
-    lines = LineCollection([shapely.get_coordinates(path)], colors=INK, linewidths=width, alpha=0.75, zorder=4)
+    paths = [shapely.get_coordinates(path) for path in shapely.get_parts(judgement.paths)]
+    lines = LineCollection(paths, colors=INK, linewidths=width, alpha=0.75, zorder=4)
     axes.add_collection(lines, autolim=False)
     sheet.draw_disc(axes, judgement.cover.place, radius_m)
 
@@ -116,7 +118,7 @@ def _draw_magnified(figure: Figure, axes: Axes, site: Site, judgement: Judgement
     inset = figure.add_axes((*corner, *size), facecolor=sheet.LAND, xticks=[], yticks=[])
     inset.set(xlim=(x - shown_m, x + shown_m), ylim=(y - shown_m, y + shown_m))
     sheet.draw_site(inset, site, request.safety_m)
-    _draw_gaps(inset, judgement, request.path)
+    _draw_gaps(inset, judgement)
     inset.spines[:].set_color(GAP)
     inset.set_title(f"the worst gap, {times:.2g} times larger", fontsize=8, color=GAP, loc="left", pad=4)
 
@@ -135,7 +137,7 @@ def _free_square(axes: Axes, site: Site, place: Place, side_m: float) -> Polygon
     return min(free, key=shapely.Point(place).distance, default=None)
 
 
-def _draw_distance(axes: Axes, region: MultiPolygon, path: LineString, least_radius_m: float) -> None:
+def _draw_distance(axes: Axes, region: MultiPolygon, paths: Paths, least_radius_m: float) -> None:
     """The distance on a grid, clipped to the region."""
     (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
     pixel_m = (east - west) / 2000
@@ -150,7 +152,7 @@ def _draw_distance(axes: Axes, region: MultiPolygon, path: LineString, least_rad
     shapely.prepare(near)
     wanted = shapely.contains_xy(near, places[..., 0], places[..., 1])
     radii = np.full(wanted.shape, np.nan)
-    radii[wanted] = PathDistance(path)(places[wanted]) / least_radius_m
+    radii[wanted] = PathDistance(paths)(places[wanted]) / least_radius_m
     image = axes.imshow(
         radii,
         extent=(x[0] - step_m / 2, x[-1] + step_m / 2, y[0] - step_m / 2, y[-1] + step_m / 2),

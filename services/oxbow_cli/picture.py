@@ -1,4 +1,4 @@
-"""A picture of a completed Mission File: the water, what keeps the path off it, and the path."""
+"""A picture of a completed Mission File: the water, what keeps the paths off it, hot spots, and the paths."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 
 from oxbow.contracts import FloatArray
 from oxbow.frame import lonlat
-from oxbow.mission import Mission
+from oxbow.mission import Mission, MissionType
+from oxbow.plan import TreatmentRecord
 from oxbow.site import Site
 from oxbow_cli import sheet
 from oxbow_cli.sheet import GAP, INK
@@ -21,6 +22,9 @@ __all__ = ["draw"]
 
 PROGRESS = "viridis"
 _COLOURS = 256
+FLEET = ("#2166ac", "#d6604d", "#1b7837", "#762a83", "#b35806", "#01665e", "#c51b7d", "#4d4d4d")
+"""Colours of the vehicles of a fleet, in turn."""
+SPOT = "#f6c1b5"
 
 
 def draw(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
@@ -44,9 +48,14 @@ def draw(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     site = Site.of(mission)
     figure, axes = sheet.new_sheet(site)
     sheet.draw_site(axes, site, mission.safety_m)
-    if mission.master_path:
-        _draw_path(axes, site.frame.to_planar(lonlat(mission.master_path)), site.nominal_spacing_m)
+    for spot in site.hot_spots:
+        axes.add_patch(sheet.patch(spot.area, facecolor=SPOT, edgecolor=GAP, linewidth=0.7, alpha=0.7, zorder=3))
+    paths = [site.frame.to_planar(lonlat(planned.path)) for planned in mission.planned_paths]
+    if len(paths) == 1:
+        _draw_path(axes, paths[0], site.nominal_spacing_m)
         _draw_progress_key(figure)
+    elif paths:
+        _draw_fleet(axes, mission, paths, site)
     _draw_findings(axes, mission, site)
     sheet.draw_ends(axes, site)
     sheet.draw_scale_and_north(axes)
@@ -68,6 +77,18 @@ def _draw_path(axes: Axes, xy: FloatArray, spacing_m: float) -> None:
         ),
         autolim=False,
     )
+
+
+def _draw_fleet(axes: Axes, mission: Mission, paths: list[FloatArray], site: Site) -> None:
+    """The path of each vehicle in a colour of its own, and a key with the names."""
+    width = sheet.line_width(axes, site.nominal_spacing_m)
+    for number, (planned, xy) in enumerate(zip(mission.planned_paths, paths, strict=True)):
+        axes.plot(*xy.T, color=FLEET[number % len(FLEET)], linewidth=width, label=planned.name, zorder=4)
+    axes.autoscale(False)
+    key = axes.legend(
+        loc="upper left", bbox_to_anchor=(0.03, 0.99), fontsize=8, frameon=False, labelcolor=INK, handlelength=1.5
+    )
+    key.set_zorder(8)
 
 
 def _pieces(xy: FloatArray) -> list[FloatArray]:
@@ -106,13 +127,23 @@ def _draw_progress_key(figure: Figure) -> None:
 
 def _figures(mission: Mission) -> str:
     """The line below the title: what was planned, how densely, and how near it is to the best possible."""
-    if not mission.master_path:
+    if not mission.planned_paths:
         return "no path yet: the site alone"
     if mission.plan is None:
         return "a path without a record of its planning"
     plan = mission.plan
     dropped = f"   dropped {sheet.area_text(sum(part.area_m2 for part in plan.dropped))}" if plan.dropped else ""
+    paths = f"{len(mission.planned_paths)} paths" if len(mission.planned_paths) > 1 else "path"
+    treated = "" if plan.treatment is None else f"   {_treated(plan.treatment)}"
+    if mission.mission_type is MissionType.TREAT:
+        return f"{paths} {sheet.distance_text(plan.length_m)}{treated}"
     return (
-        f"{plan.method} path {sheet.distance_text(plan.length_m)}   spacing {sheet.distance_text(plan.spacing_m)}"
-        f"   q {plan.certificate.q:.2f}   p95 {plan.certificate.p95_ratio:.2f}{dropped}"
+        f"{plan.method} {paths} {sheet.distance_text(plan.length_m)}"
+        f"   spacing {sheet.distance_text(plan.spacing_m)}"
+        f"   q {plan.certificate.q:.2f}   p95 {plan.certificate.p95_ratio:.2f}{treated}{dropped}"
     )
+
+
+def _treated(treatment: TreatmentRecord) -> str:
+    treated = sum(spot.treated_share > 0 for spot in treatment.hot_spots)
+    return f"{treated} of {len(treatment.hot_spots)} hot spots treated"

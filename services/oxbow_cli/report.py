@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from oxbow.contracts import MissionState
+from oxbow.contracts import Conformance, MissionState
 from oxbow.frame import Position
 
 if TYPE_CHECKING:
@@ -84,6 +84,8 @@ def print_plan(planned: Planned, file: Path) -> None:
 def _plan_table(site: str, plan: PlanRecord) -> Table:
     """A plan in the measures that its user asks for first."""
     certificate = plan.certificate
+    treats_only = plan.treatment is not None and plan.slave_certificate is None
+    water = "hot spots" if treats_only else "water"
     rows = [
         ("method", f"{plan.method}, seed {plan.seed}"),
         ("heading", "-" if plan.heading_deg is None else f"{plan.heading_deg % 180:.1f} deg"),
@@ -92,23 +94,47 @@ def _plan_table(site: str, plan: PlanRecord) -> Table:
         ("duration", _duration(plan.duration_s)),
         ("waypoints", f"{certificate.waypoints}"),
         (
-            "water",
+            water,
             f"{certificate.free_area_m2 / 1e6:.3f} km2, {certificate.judged_area:.1%} in parts that it enters",
         ),
         *_quality(certificate.cover_radius_m, certificate.least_radius_m, certificate.q, certificate.p95_ratio),
-        ("conforms", _conformance(certificate.is_simple, certificate.outside_m, certificate.unsafe_m)),
+        # A way home may cross the way out where hot spots are treated between them.
+        ("conforms", _conformance(None if treats_only else certificate.is_simple, certificate)),
     ]
     if plan.mission_id is not None:
         rows.insert(0, ("mission", f"{plan.mission_id}, revision {plan.revision}"))
+    rows += _fleet_rows(plan)
     rows += [("dropped", text) for text in _dropped(plan)]
     rows += [("warning", warning) for warning in plan.warnings]
     return _table(f"Plan of {site}", rows)
 
 
+def _fleet_rows(plan: PlanRecord) -> Rows:
+    """A row for each vehicle, and what becomes of hot spots."""
+    for vehicle in () if plan.fleet is None else plan.fleet.vehicles:
+        way = f"{_length(vehicle.length_m)} of {_length(vehicle.max_length_m)}, {_duration(vehicle.duration_s)}"
+        task = f"treats {', '.join(vehicle.hot_spots)}" if vehicle.hot_spots else "surveys"
+        if not vehicle.hot_spots and vehicle.area_m2 is not None:
+            task += f" {vehicle.area_m2 / 1e6:.3f} km2"
+        yield vehicle.name, f"{vehicle.role}: {way}; {task}"
+    if plan.treatment is None:
+        return
+    for spot in plan.treatment.hot_spots:
+        yield spot.hot_spot, f"value {spot.value:g}, {spot.treated_share:.1%} treated"
+    for sortie in plan.treatment.further:
+        yield "further sortie", f"{sortie.vehicle}: {', '.join(sortie.hot_spots)}, {_length(sortie.length_m)}"
+    for left in plan.treatment.left:
+        yield "left", f"{left.hot_spot}: {left.reason}"
+
+
 def print_evaluation(site: str, found: Evaluation) -> None:
     """Write every measure of an evaluation to stdout, under its name."""
     rows = ((name, _figure(value)) for name, value in msgspec.structs.asdict(found).items())
-    _console().print(_table(f"Evaluation of {site}", rows))
+    console = _console()
+    console.print(_table(f"Evaluation of {site}", rows))
+    for vehicle in found.vehicles if len(found.vehicles) > 1 else ():
+        rows = ((name, _figure(value)) for name, value in msgspec.structs.asdict(vehicle).items())
+        console.print(_table(f"Path of {vehicle.name}", rows))
 
 
 def comparison_document(files: tuple[Path, Path], found: Comparison) -> dict[str, Any]:
@@ -195,9 +221,10 @@ def _quality(radius_m: tuple[float, float], least_m: float, q: float, p95_ratio:
     yield "q", f"{q:.2f} (farthest / least possible); {p95_ratio:.2f} for 95 % of the water"
 
 
-def _conformance(is_simple: bool, outside_m: float, unsafe_m: float) -> str:
-    simple = "never crosses itself" if is_simple else "CROSSES ITSELF"
-    return f"{simple}; {outside_m:.2f} m outside, {unsafe_m:.2f} m within Safety"
+def _conformance(is_simple: bool | None, found: Conformance) -> str:
+    """Whether the rules are kept; None where a path may cross itself."""
+    simple = {None: "", True: "never crosses itself; ", False: "CROSSES ITSELF; "}[is_simple]
+    return f"{simple}{found.outside_m:.2f} m outside, {found.unsafe_m:.2f} m within Safety"
 
 
 def _dropped(plan: PlanRecord) -> Iterator[str]:
@@ -232,6 +259,8 @@ def _figure(value: Any) -> str:
         return "-"
     if isinstance(value, Position):
         return _place(value)
+    if isinstance(value, tuple) and all(isinstance(each, msgspec.Struct) for each in value):
+        return str(len(value))
     if isinstance(value, tuple):
         return " .. ".join(map(_figure, value))
     return f"{value:.6g}" if isinstance(value, float) else str(value)
