@@ -53,7 +53,9 @@ class Campaign:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What whoever reads the sorties should know."""
-        return (*_leg_warnings(self.fleet), *_outside_warnings(self.treatments))
+        first = self.schedule.first
+        unlike = () if first is None or first.joint is None or not first.gap.reason else (first.gap.reason,)
+        return (*_leg_warnings(self.fleet), *_outside_warnings(self.treatments), *unlike)
 
     def treated_share(self, journeys: Sequence[Journey], swath_m: float) -> tuple[float, ...]:
         """How much of each hot spot's water lies within half a swath of journeys; 0 where there is no water."""
