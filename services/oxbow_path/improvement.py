@@ -16,7 +16,7 @@ __all__ = ["improved", "method_plan"]
 
 def improved(path: Polyline, task: Task, display: Display) -> LineString:
     """The path refined for the task; one already longer than is useful may stay as long."""
-    fits = path.length_m <= task.length_m
+    fits = task.budget.fits(path.length_m)
     return refined(
         path,
         task.waters.free,

@@ -31,12 +31,6 @@ Stop = Callable[[], bool]
 
 STAGE = "path"
 
-LENGTH_USED = 0.999
-"""Share of the longest length that a path may use: what is left covers the rounding of written positions."""
-
-ENOUGH = 0.97
-"""Share of the longest length that a path should use at least."""
-
 FINEST = 200
 """At most so many spacings make up the root of the water's area."""
 
@@ -63,18 +57,15 @@ class Task:
         What is asked.
     waters
         Where the path may run, and how launch and recovery points are reached.
-    length_m
-        The longest path to plan.
-    least_spacing_m
-        Parallel legs need not stand closer.
+    budget
+        The longest path to plan, and how near its legs may come.
     stop
         Whether time is up.
     """
 
     request: PathRequest
     waters: Waters
-    length_m: float
-    least_spacing_m: float
+    budget: Budget
     stop: Stop
 
     @classmethod
@@ -90,7 +81,7 @@ class Task:
         least_spacing_m = max(request.min_spacing_m, finest_spacing_m(request.space))
         nominal_m = max(request.space.free.area / request.length_m, least_spacing_m)
         waters = prepared_waters(request, nominal_m)
-        return cls(request, waters, LENGTH_USED * request.length_m, least_spacing_m, stop)
+        return cls(request, waters, Budget(request.length_m, least_spacing_m), stop)
 
     @property
     def spacing_m(self) -> float:
@@ -100,12 +91,7 @@ class Task:
     @property
     def useful_length_m(self) -> float:
         """The length that is worth travelling: what the least spacing asks for, or the longest there may be."""
-        return min(self.length_m, self.waters.free.area / self.spacing_m)
-
-    @property
-    def budget(self) -> Budget:
-        """The lengths and spacings that a pattern is fitted to."""
-        return Budget(self.length_m, ENOUGH * self.length_m, self.least_spacing_m)
+        return min(self.budget.most_m, self.waters.free.area / self.spacing_m)
 
     @cached_property
     def areas(self) -> tuple[WeightedArea, ...]:

@@ -40,6 +40,7 @@ def request(
     min_spacing_m: float = 0.0,
     heading_rad: float | None = None,
     method: Method = Method.TRANSECT,
+    time_limit_s: float | None = None,
 ) -> PathRequest:
     """A request for some water: `spacings` is the length, and `safety` the distance, over the root of the area."""
     scale_m = math.sqrt(water.area)
@@ -59,4 +60,5 @@ def request(
         recovery=recovery or launch,
         length_m=length_m,
         min_spacing_m=min_spacing_m,
+        time_limit_s=time_limit_s,
     )

@@ -230,7 +230,7 @@ def trial_of(length_m: float, spacing_m: float) -> Trial:
 
 @pytest.mark.parametrize("power", [0.6, 1.0, 1.6])
 def test_the_spacing_loop_finds_the_length(power):
-    budget = Budget(most_m=1000.0, enough_m=970.0)
+    budget = Budget(limit_m=1000.0)
     trials = fitted(
         lambda pattern: trial_of(30_000.0 / pattern.spacing_m**power, pattern.spacing_m),
         Pattern(10.0, 1.5, 0.25),
@@ -241,7 +241,7 @@ def test_the_spacing_loop_finds_the_length(power):
 
 
 def test_the_spacing_loop_keeps_the_least_spacing():
-    budget = Budget(most_m=1000.0, enough_m=970.0, least_spacing_m=80.0)
+    budget = Budget(limit_m=1000.0, least_spacing_m=80.0)
     trials = fitted(
         lambda pattern: trial_of(30_000.0 / pattern.spacing_m, pattern.spacing_m), Pattern(10.0, 1.5, 0.25), budget
     )

@@ -140,7 +140,7 @@ def waters_of(asked: PathRequest) -> Waters:
 
 def planned(asked: PathRequest) -> WatershedPlan:
     """A plan whose path was checked in the planar frame."""
-    plan = plan_watershed(waters_of(asked), Budget(0.999 * asked.length_m, 0.97 * asked.length_m))
+    plan = plan_watershed(waters_of(asked), Budget(asked.length_m))
     back = partial(from_sweep, heading_rad=asked.decomposition.heading_rad)
     path = shapely.transform(plan.chosen.path, back)
     require_conforming(path, asked)

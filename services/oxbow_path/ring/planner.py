@@ -58,7 +58,7 @@ def space_filling_curve(task: Task, display: Display) -> MethodPlan:
         if number % SHOWN_EVERY == 0:
             display.lines("ring", [ring.line], step=number, labels=(f"epoch {number}",))
     path = improved(ring, task, display)
-    if path.length > task.length_m:
+    if not task.budget.fits(path.length):
         path = start.path
     steps.append(SpacingStep(spacing_m=task.spacing_m, length_m=path.length))
     return MethodPlan(path, task.spacing_m, REACH_NAMED * task.spacing_m / 2, tuple(steps))
@@ -69,7 +69,7 @@ def _start(task: Task) -> Trial:
     x0, y0, x1, y1 = task.waters.free.bounds
     for spacing_m in (*(factor * task.spacing_m for factor in START_SPACINGS), 2 * math.hypot(x1 - x0, y1 - y0)):
         trial = try_transects(task.waters, Pattern(spacing_m, REACH, PHASE))
-        if trial.length_m <= task.length_m:
+        if task.budget.fits(trial.length_m):
             return trial
     raise Infeasible(
         f"is {task.request.length_m:.0f} m; the shortest path from launch to recovery is {trial.length_m:.0f} m",

@@ -31,9 +31,6 @@ from oxbow_path.walk.trial import Pattern, Trial, Waters, finished
 
 __all__ = ["TourPlan", "TourTrial", "plan_tour"]
 
-ENOUGH = 0.97
-"""Share of the longest length that a path should use at least."""
-
 EVENNESS = 0.98
 """The shortest tour of n sites over area A has about this length, times the root of n A.
 
@@ -145,10 +142,10 @@ def plan_tour(task: Task, *, solver: Solver | None = None) -> TourPlan:
     Infeasible
         Even the shortest way from launch to recovery is longer than the vehicle can go.
     """
-    budget = Budget(task.length_m, ENOUGH * task.length_m, task.least_spacing_m)
+    budget = task.budget
     area_m2 = task.waters.free.area
-    most = max(1, int(area_m2 / task.least_spacing_m**2))
-    first = min(most, max(1, round((task.length_m / EVENNESS) ** 2 / area_m2)))
+    most = max(1, int(area_m2 / budget.least_spacing_m**2))
+    first = min(most, max(1, round((budget.most_m / EVENNESS) ** 2 / area_m2)))
     attempt = _Attempt(
         task.waters, min(2 * SAMPLES * first, MOST_SAMPLES), task.request.seed, solver or _best_solver()
     )

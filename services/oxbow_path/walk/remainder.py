@@ -9,6 +9,7 @@ from shapely.ops import substring
 
 from oxbow.contracts import FloatArray
 from oxbow_path.walk.gaps import branch_to
+from oxbow_path.walk.legs import ROUNDING_M
 from oxbow_path.walk.region import Brush, Walk, largest, simply_connected
 from oxbow_path.walk.spacing import Budget
 from oxbow_path.walk.trial import Trial, Waters, finished, touches_entries
@@ -25,6 +26,9 @@ LEAST_SHARE = 0.002
 """A remainder smaller than this share of the length is left."""
 
 SHORTENINGS = 4
+
+LEAST_CLEARANCE_M = 1e-8
+"""Stretches of a path that come nearer to each other than this may cross by rounding."""
 
 
 def with_remainder(trial: Trial, waters: Waters, budget: Budget) -> Trial:
@@ -53,7 +57,11 @@ def _with_spur(trial: Trial, waters: Waters, left_m: float) -> Trial | None:
         if longer is None:
             return None
         growth_m = longer.length_m - trial.length_m
-        if 0.0 < growth_m <= left_m and waters.probe.distances(longer.path).max() <= depth_m:
+        if (
+            0.0 < growth_m <= left_m
+            and waters.probe.distances(longer.path).max() <= depth_m
+            and _keeps_clear(longer.path)
+        ):
             return longer
         spur = _end(spur, spur.length * (0.95 * left_m / growth_m if growth_m > left_m else 0.5))
     return None
@@ -87,3 +95,9 @@ def _grown(trial: Trial, waters: Waters, spur: LineString) -> Trial | None:
     if not touches_entries(walk.region, waters):
         return None
     return finished(waters, trial.pattern, trial.circuit, Walk(walk.region, trial.walk.cuts, trial.walk.enclosed))
+
+
+def _keeps_clear(path: LineString) -> bool:
+    """Whether no two stretches are so near to each other that they may cross once the path is turned."""
+    distinct = shapely.remove_repeated_points(path, ROUNDING_M)
+    return bool(shapely.minimum_clearance(distinct) > LEAST_CLEARANCE_M)

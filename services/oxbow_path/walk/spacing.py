@@ -13,6 +13,9 @@ from oxbow_path.walk.trial import Pattern, Trial, Waters
 
 __all__ = ["Budget", "best_trial", "fitted"]
 
+MOST, ENOUGH = 0.999, 0.97
+"""Shares of the longest length that a path may, and should, use."""
+
 TURNS = 8
 """Trials for one pattern before the best so far is taken."""
 
@@ -25,11 +28,20 @@ SENSITIVITY = 1.0
 
 @dataclass(frozen=True)
 class Budget:
-    """How long the path may be, how long it should be at least, and how near its legs may come."""
+    """The longest path allowed, and how near its legs may come."""
 
-    most_m: float
-    enough_m: float
+    limit_m: float
     least_spacing_m: float = 0.0
+
+    @property
+    def most_m(self) -> float:
+        """How long the path may be: what is left covers the rounding of written positions."""
+        return MOST * self.limit_m
+
+    @property
+    def enough_m(self) -> float:
+        """How long it should be at least."""
+        return ENOUGH * self.limit_m
 
     def fits(self, length_m: float) -> bool:
         return length_m <= self.most_m
@@ -89,7 +101,7 @@ def best_trial(trials: Iterable[Trial], waters: Waters, budget: Budget) -> Trial
     if not fitting:
         shortest_m = min(trial.length_m for trial in trials)
         raise Infeasible(
-            f"allows {budget.most_m:.0f} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
+            f"is {budget.limit_m:.0f} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
             "Master_length",
         )
 
