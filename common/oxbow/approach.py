@@ -31,8 +31,8 @@ HALVINGS = 8
 """How often that distance may be halved until both ways fit."""
 GATES = 48
 """Places of a share's rim that may be its gate, at most about."""
-INSIDE_M = 1e-3
-"""How far inside its share a gate lies: enough that rounding does not move it out."""
+ROUNDING_M = 1e-6
+"""Places nearer to each other than this are one."""
 OFF_M = 1e-2
 """A leg that strays so little from the water stays in it: what the certificate takes for the shore."""
 SPARE = 1.001
@@ -164,19 +164,19 @@ class Harbour:
         """
         start, recovery = vehicle.start, vehicle.recovery
         out_is_remote, home_is_remote = (self._is_remote(share, place) for place in (start, recovery))
-        space = structs.replace(
-            self.space, free=share, water=share if out_is_remote and home_is_remote else self.space.water
-        )
         if not (out_is_remote or home_is_remote):
-            return Approach(space, start, recovery)
+            return Approach(structs.replace(self.space, free=share), start, recovery)
         found = self._to_gate(share, start if out_is_remote else recovery)
         lanes, way = found.lanes, found.line
         gate: Place = (float(way[-1, 0]), float(way[-1, 1]))
         home = way
         if out_is_remote and recovery != start:
             home = np.vstack([lanes.way(recovery, way[-2]), gate])
+        # The gate becomes a vertex: no path in the share passes between it and the rim.
+        share = shapely.snap(share, Point(gate), ROUNDING_M)
+        water = share if out_is_remote and home_is_remote else self.space.water
         return Approach(
-            space=space,
+            space=structs.replace(self.space, free=share, water=water),
             launch=gate if out_is_remote else start,
             recovery=gate if home_is_remote else recovery,
             water=self.space.free,
@@ -188,7 +188,7 @@ class Harbour:
     def _is_remote(self, share: Polygon, place: Place) -> bool:
         """Whether a place is nearer to other free water than to the share."""
         point = Point(place)
-        return bool(share.distance(point) > self.space.free.distance(point) + INSIDE_M)
+        return bool(share.distance(point) > self.space.free.distance(point) + ROUNDING_M)
 
     def _to_gate(self, share: Polygon, place: Place) -> _Way:
         """The middle line of a leg from a place to a share, in lanes as wide as the water allows."""
@@ -220,8 +220,7 @@ class _Lanes:
 
     def to_gate(self, share: Polygon, place: Place) -> FloatArray | None:
         """The middle line from a place to the nearest gate of a share; None where no way leads there."""
-        reached = share.buffer(-INSIDE_M, join_style="mitre")
-        gates = _edge_middles(share.buffer(-2.0 * INSIDE_M, join_style="mitre").intersection(self._middle), GATES)
+        gates = _edge_middles(share.intersection(self._middle), GATES)
         if self._middle.is_empty or not len(gates):
             return None
         distances = self._router.distances(np.vstack([self._entry(place), gates]))[0, 1:]
@@ -231,7 +230,7 @@ class _Lanes:
         # From where it is near, straight on: one side of a leg that met the rim at a slant would lie in the share.
         near = shapely.points(shapely.get_coordinates(line.intersection(share.buffer(2.0 * self.apart_m))))
         far = shapely.get_coordinates(substring(line, 0.0, float(shapely.line_locate_point(line, near).min())))
-        gate = shapely.get_coordinates(shapely.shortest_line(reached, Point(far[-1])))[0]
+        gate = shapely.get_coordinates(shapely.shortest_line(share, Point(far[-1])))[0]
         return np.vstack([place, far, gate])
 
     def _entry(self, place: Place) -> FloatArray:

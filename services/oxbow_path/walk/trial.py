@@ -27,6 +27,9 @@ CUT = 0.25
 START = 0.1
 """Radius of the region that a path without transects grows from, in nominal spacings."""
 
+SMOOTHINGS = 3
+"""How often a ring that all but touches itself is smoothed, each time by a quarter as much."""
+
 STRAIGHTENING = 0.05
 """How far the walk may be moved to straighten it, in spacings."""
 
@@ -115,11 +118,12 @@ def walked(waters: Waters, pattern: Pattern, circuit: Circuit) -> Trial:
 
 def finished(waters: Waters, pattern: Pattern, circuit: Circuit, walk: Walk) -> Trial:
     """A walk that touches both entries, with its legs; smoothed first where its ring all but touches itself."""
-    if not is_plainly_simple(LineString(walk.region.exterior)):
-        width_m = STRAIGHTENING * pattern.spacing_m
-        smooth = walk.region.buffer(width_m).buffer(-2 * width_m).buffer(width_m)
-        region = _accessible(clear_of_land(smooth, waters.free), waters, Brush(waters.free, width_m, 0.0))
-        walk = Walk(Polygon(region.exterior), walk.cuts, walk.enclosed)
+    width_m = STRAIGHTENING * pattern.spacing_m
+    for _ in range(SMOOTHINGS):
+        if is_plainly_simple(LineString(walk.region.exterior)):
+            break
+        walk = Walk(_smoothed(walk.region, waters, width_m), walk.cuts, walk.enclosed)
+        width_m /= 4
     path = joined(
         walk.region,
         waters.launch,
@@ -129,6 +133,14 @@ def finished(waters: Waters, pattern: Pattern, circuit: Circuit, walk: Walk) -> 
         detail_m=pattern.half_width_m,
     )
     return Trial(pattern, circuit, walk, path)
+
+
+def _smoothed(region: Polygon, waters: Waters, width_m: float) -> Polygon:
+    """The region without gaps and necks narrower than twice `width_m`; as it was, if nothing else is left."""
+    smooth = clear_of_land(region.buffer(width_m).buffer(-2 * width_m).buffer(width_m), waters.free)
+    if smooth.is_empty:
+        return region
+    return Polygon(_accessible(smooth, waters, Brush(waters.free, width_m, 0.0)).exterior)
 
 
 def _started(waters: Waters, circuit: Circuit, brush: Brush) -> Polygon:
