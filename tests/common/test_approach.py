@@ -1,0 +1,119 @@
+"""Legs to shares: they keep to the free space, run beside one another, and leave the path simple."""
+
+import math
+
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import LineString, Point, Polygon, box
+
+from oxbow.approach import Approach, Harbour
+from oxbow.contracts import FreeSpace, Role, Vehicle
+from oxbow.errors import Infeasible
+
+LAKE = box(0, 0, 1000, 400) - box(300, 100, 500, 400)
+FREE = LAKE.buffer(-5.0, join_style="mitre")
+SPACE = FreeSpace(free=FREE, water=LAKE, tolerance_m=1.0, compression=1.0)
+EAST = FREE & box(600, 0, 1000, 400)
+SPACING_M = 20.0
+
+quick = settings(deadline=None, max_examples=40, derandomize=True)
+ashore = st.tuples(st.floats(-20, 0), st.floats(10, 390))
+afloat = st.tuples(st.floats(6, 290), st.floats(6, 390))
+
+
+def vehicle(start, recovery=None, length_m=1e5) -> Vehicle:
+    return Vehicle(name="v", role=Role.MASTER, length_m=length_m, start=start, recovery=recovery or start)
+
+
+def ring(share: Polygon, gate) -> LineString:
+    """A path in a share that begins and ends at its gate: round a part of it."""
+    inner = share.buffer(-10.0, join_style="mitre").exterior
+    away = inner.project(Point(gate))
+    start, end = inner.interpolate(away - 3.0), inner.interpolate((away + 3.0) % inner.length)
+    around = [
+        inner.interpolate((away + 3.0 + share_of * (inner.length - 6.0)) % inner.length)
+        for share_of in (0.2, 0.4, 0.6, 0.8)
+    ]
+    line = LineString([gate, end, *around, start, gate])
+    assert line.is_simple
+    return line
+
+
+def joined(approach: Approach, start, recovery) -> LineString:
+    assert approach.launch == approach.recovery
+    path = approach.joined(ring(EAST, approach.launch))
+    assert path.is_simple
+    assert (path.coords[0], path.coords[-1]) == (start, recovery)
+    return path
+
+
+@given(start=ashore | afloat)
+@quick
+def test_out_and_home_from_one_place(start):
+    approach = Harbour(SPACE, SPACING_M).approach(EAST, vehicle(start))
+    assert EAST.covers(Point(approach.launch))
+    assert approach.space.free.area == pytest.approx(EAST.area)
+    path = joined(approach, start, start)
+    entry = FREE.distance(Point(start))
+    stray = path - FREE.buffer(0.01) - Point(start).buffer(1.5 * entry + SPACING_M)
+    assert stray.is_empty
+
+
+@given(start=afloat, recovery=ashore | afloat)
+@quick
+def test_out_from_one_place_and_home_to_another(start, recovery):
+    joined(Harbour(SPACE, SPACING_M).approach(EAST, vehicle(start, recovery)), start, recovery)
+
+
+@given(start=afloat)
+@quick
+def test_what_legs_take_is_no_less_than_their_length(start):
+    approach = Harbour(SPACE, SPACING_M).approach(EAST, vehicle(start))
+    around = ring(EAST, approach.launch)
+    legs_m = 1e5 - approach.length_m(1e5)
+    assert approach.joined(around).length <= around.length + legs_m
+    assert legs_m < 2.0 * (math.dist(start, approach.launch) + 500.0)
+
+
+def test_a_vehicle_at_its_share_has_no_legs():
+    for start in ((700.0, 200.0), (1010.0, 200.0), (990.0, 399.0)):
+        approach = Harbour(SPACE, SPACING_M).approach(EAST, vehicle(start))
+        assert approach.out is None
+        assert approach.home is None
+        assert approach.space.water.equals(LAKE)
+        assert approach.length_m(5.0) == 5.0
+        path = LineString([start, (800, 200), start])
+        assert approach.joined(path) is path
+
+
+def test_a_way_that_is_longer_than_the_range_is_refused_with_its_length():
+    approach = Harbour(SPACE, SPACING_M).approach(EAST, vehicle((100.0, 100.0)))
+    with pytest.raises(Infeasible, match=r"Master_length: is 900 m; the way .* is 1\d\d\d m"):
+        approach.length_m(900.0)
+
+
+def test_lanes_are_as_narrow_as_the_water():
+    strait = LAKE - box(300, 4.0, 500, 200)
+    free = strait.buffer(-1.0, join_style="mitre")
+    space = FreeSpace(free=free, water=strait, tolerance_m=1.0, compression=1.0)
+    share = free & box(600, 0, 1000, 400)
+    assert isinstance(share, Polygon)
+    approach = Harbour(space, SPACING_M).approach(share, vehicle((100.0, 100.0)))
+    assert 4.0 * approach.apart_m <= 2.0
+    path = approach.joined(ring(share, approach.launch))
+    assert path.is_simple
+    assert (path - free.buffer(0.01)).is_empty
+
+
+def test_water_without_a_way_to_the_share_is_refused():
+    apart = box(0, 0, 100, 100)
+    space = FreeSpace(
+        free=shapely.union_all([apart, box(100, 40, 200, 40.0001), box(200, 0, 300, 100)]),
+        water=LAKE,
+        tolerance_m=1.0,
+        compression=1.0,
+    )
+    with pytest.raises(Infeasible, match="no way"):
+        Harbour(space, SPACING_M).approach(box(200, 0, 300, 100), vehicle((50.0, 50.0)))

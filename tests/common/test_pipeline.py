@@ -1,0 +1,227 @@
+"""Every mission type, for one vehicle and several, from file to plan in one process."""
+
+import json
+from itertools import pairwise
+
+import pytest
+import shapely
+from shapely import LineString
+
+from oxbow.contracts import ASSIGN, Method, Role
+from oxbow.errors import Infeasible
+from oxbow.frame import lonlat
+from oxbow.mission import MissionType, mission_json, parse_mission
+from oxbow.pipeline import expected_calls, plan_mission
+from oxbow.plan import PlanOptions
+from oxbow.site import Site
+from oxbow_cli.evaluation import evaluate
+from oxbow_cli.local import local_call
+
+OPTIONS = PlanOptions(method=Method.TRANSECT)
+
+
+def at(x_m, y_m):
+    return {"lat": 46.0 + y_m / 111_150.0, "long": 1.0 + x_m / 77_470.0}
+
+
+def contour(*corners):
+    return [at(x, y) for x, y in corners]
+
+
+def spot(west, south, size, value):
+    corners = [at(x, y) for x, y in ((0, 0), (size, 0), (size, size), (0, size), (0, 0))]
+    ring = [[c["long"] + west / 77_470.0, c["lat"] + south / 111_150.0] for c in corners]
+    geometry = {"type": "Polygon", "coordinates": [ring]}
+    return {"type": "Feature", "geometry": geometry, "properties": {"value": value}}
+
+
+WATER = contour((0, 0), (800, 0), (800, 300), (500, 300), (450, 120), (350, 120), (300, 300), (0, 300))
+SPOTS = [spot(50, 200, 60, 40.0), spot(700, 200, 50, 50.0), spot(400, 20, 40, 35.0), spot(100, 30, 30, 10.0)]
+PRIOR = {"type": "FeatureCollection", "features": SPOTS}
+
+
+def boats(role, count, **fields):
+    return [{"Name": f"{role} {number}", "Role": role} | fields for number in range(count)]
+
+
+def mission(kind, vehicles=None, prior=PRIOR, **changes):
+    fields = {
+        "MissionType": kind,
+        "LaunchPoint": at(10, 1),
+        "BoundingBox": WATER,
+        "ForbiddenZones": [contour((600, 100), (650, 100), (650, 150), (600, 150))],
+        "Bloom": {"Sensor": "chl", "Value": 30.0},
+        "Master_length": 4_000.0,
+        "Slave_length": 3_000.0,
+        "Safety": 5.0,
+        "Swath": 8.0,
+        "Vehicles": vehicles,
+        "PriorModel": prior,
+    }
+    return parse_mission(json.dumps(fields | changes).encode())
+
+
+class Calls:
+    """A call of real stages that remembers what was asked and answered."""
+
+    def __init__(self):
+        self.stages = []
+        self.shares = {}
+        self._call = local_call()
+
+    def __call__(self, endpoint, request, /):
+        reply = self._call(endpoint, request)
+        self.stages.append(endpoint.stage)
+        if endpoint is ASSIGN:
+            self.shares |= {share.vehicle: share.area for share in reply.shares}
+        return reply
+
+
+def planned(given, options=OPTIONS):
+    """The completed mission, after what holds of every plan was checked."""
+    calls = Calls()
+    completed = plan_mission(given, options, call=calls)
+    assert len(calls.stages) == expected_calls(given)
+    assert parse_mission(mission_json(completed)) == completed
+    judged = evaluate(completed)
+    for vehicle in judged.vehicles:
+        assert vehicle.outside_m == 0
+        assert vehicle.unsafe_m <= 0.01
+        assert vehicle.length_ratio <= 1
+        assert vehicle.starts_at_launch_m == vehicle.ends_at_recovery_m == 0
+        assert vehicle.is_simple or vehicle.role is Role.SLAVE
+    return completed, calls
+
+
+def lines(completed):
+    frame = Site.of(completed).frame
+    return {path.name: LineString(frame.to_planar(lonlat(path.path))) for path in completed.planned_paths}
+
+
+@pytest.mark.parametrize("kind", ["map", "adap"])
+def test_one_master_surveys(kind):
+    completed, calls = planned(mission(kind))
+    assert calls.stages == ["contour", "decomposition", "path", "certificate"]
+    assert completed.master_path
+    assert completed.slave_path is completed.paths is None
+    assert completed.plan.fleet is completed.plan.treatment is None
+    assert completed.plan.certificate.judged_area == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_masters_share_the_water_and_keep_to_their_shares(count):
+    completed, calls = planned(mission("map", boats("master", count)))
+    plan, paths = completed.plan, lines(completed)
+    assert completed.master_path is None
+    assert list(paths) == [vehicle.name for vehicle in plan.fleet.vehicles] == list(calls.shares)
+    assert plan.fleet.imbalance <= 0.05
+    assert plan.fleet.makespan_s == max(vehicle.duration_s for vehicle in plan.fleet.vehicles)
+    assert plan.certificate.q <= 3.2
+    assert plan.length_m == pytest.approx(sum(vehicle.length_m for vehicle in plan.fleet.vehicles))
+    for name, path in paths.items():
+        outside = shapely.get_parts(path.difference(calls.shares[name].buffer(0.01)))
+        ends = shapely.MultiPoint([path.coords[0], path.coords[-1]])
+        assert all(leg.distance(ends) < 0.1 for leg in outside if leg.length > 0.1)
+
+
+def test_shares_are_in_proportion_to_length_times_speed():
+    vehicles = [*boats("master", 1, Speed=2.0), {"Name": "slow", "Role": "master", "Start": at(790, 290)}]
+    completed, _ = planned(mission("map", vehicles))
+    fast, slow = completed.plan.fleet.vehicles
+    assert fast.area_m2 == pytest.approx(2.0 * slow.area_m2, rel=0.08)
+    assert fast.duration_s < slow.duration_s
+
+
+def test_a_slave_treats_what_it_can_and_the_rest_is_proposed():
+    completed, calls = planned(mission("treat"))
+    assert calls.stages == ["contour", "assignment", "certificate"]
+    assert completed.slave_path
+    assert completed.master_path is None
+    treatment = completed.plan.treatment
+    assert [each.hot_spot for each in treatment.hot_spots] == ["features[0]", "features[1]", "features[2]"]
+    assert all(each.treated_share >= 0.99 for each in treatment.hot_spots)
+    assert completed.plan.certificate.cover_radius_m[0] < 8.0
+    (slave,) = completed.plan.fleet.vehicles
+    assert set(slave.hot_spots) == {each.hot_spot for each in treatment.hot_spots}
+
+
+def test_a_short_range_leaves_hot_spots_to_further_sorties_or_names_them():
+    completed, _ = planned(mission("treat", Slave_length=1400.0))
+    treatment = completed.plan.treatment
+    proposed = {name for sortie in treatment.further for name in sortie.hot_spots}
+    left = {each.hot_spot for each in treatment.left}
+    untreated = {each.hot_spot for each in treatment.hot_spots if each.treated_share < 0.99}
+    assert untreated
+    assert untreated <= proposed | left
+    for sortie in treatment.further:
+        assert sortie.path[0] == sortie.path[-1] == completed.launch
+        assert sortie.length_m <= 1400.0
+
+
+def test_nothing_that_can_be_treated_is_infeasible():
+    with pytest.raises(Infeasible, match="features"):
+        plan_mission(mission("treat", Slave_length=60.0), OPTIONS, call=local_call())
+
+
+@pytest.mark.parametrize("kind", ["map&treat", "adap&treat"])
+def test_master_surveys_and_slave_treats(kind):
+    completed, _ = planned(mission(kind))
+    assert completed.master_path
+    assert completed.slave_path
+    plan = completed.plan
+    assert [vehicle.role for vehicle in plan.fleet.vehicles] == [Role.MASTER, Role.SLAVE]
+    assert plan.treatment is not None
+    assert plan.slave_certificate.free_area_m2 < plan.certificate.free_area_m2 / 10
+    assert completed.bloom.value == 30.0
+
+
+@pytest.mark.parametrize("prior", [None, {"type": "FeatureCollection", "features": [SPOTS[-1]]}])
+def test_without_hot_spots_the_slave_surveys_as_far_as_it_goes(prior):
+    completed, _ = planned(mission("map&treat", prior=prior))
+    plan = completed.plan
+    master, slave = plan.fleet.vehicles
+    assert plan.treatment is None
+    assert slave.length_m <= 3_000.0 < master.length_m
+    assert plan.slave_certificate.judged_area == pytest.approx(1.0)
+    assert slave.spacing_m > master.spacing_m
+
+
+def test_many_of_both_roles():
+    fleet = [*boats("slave", 2), *boats("master", 2)]
+    completed, _ = planned(mission("adap&treat", fleet))
+    assert [path.role for path in completed.paths] == ["master", "master", "slave", "slave"]
+    assert completed.plan.length_m == pytest.approx(
+        sum(each.length_m for each in completed.plan.fleet.vehicles[:2])
+    )
+
+
+def test_errors_name_the_vehicle():
+    vehicles = [*boats("master", 1), {"Name": "far", "Role": "master", "Length": 12.0}]
+    with pytest.raises(Infeasible) as caught:
+        plan_mission(mission("map", vehicles), OPTIONS, call=local_call())
+    assert caught.value.where == "Vehicles[1].Length"
+    with pytest.raises(Infeasible) as caught:
+        plan_mission(mission("map&treat", prior=None, Slave_length=3.0), OPTIONS, call=local_call())
+    assert caught.value.where == "Slave_length"
+
+
+@pytest.mark.parametrize("kind", MissionType)
+def test_the_same_mission_gives_the_same_plan(kind):
+    given = mission(kind, [*boats("master", 2), *boats("slave", 1)])
+    first, second = (plan_mission(given, OPTIONS, call=local_call()) for _ in range(2))
+    assert mission_json(first) == mission_json(second)
+
+
+def test_progress_never_runs_backwards():
+    from oxbow_cli.planning import Job, plan_here
+
+    heard = []
+    job = Job(
+        mission("map&treat", [*boats("master", 3), *boats("slave", 1)]),
+        OPTIONS,
+        60.0,
+        lambda *step: heard.append(step),
+    )
+    plan_here(job)
+    assert all(before < after for (_, before), (_, after) in pairwise(heard))
+    assert heard[-1][1] < 1.0
