@@ -11,11 +11,23 @@ from typing import Any
 from oxbow.bus import Session
 from oxbow.mission import Mission
 
-__all__ = ["BROKEN_SEED", "INFEASIBLE_SEED", "Samples", "listening", "mission_file", "revision_of"]
+__all__ = ["BLOOM", "BROKEN_SEED", "INFEASIBLE_SEED", "Samples", "listening", "mission_file", "revision_of"]
 
 INFEASIBLE_SEED = 1_000_001
 BROKEN_SEED = 1_000_002
 """Any other seed is the time that the trivial path stage takes, in milliseconds."""
+
+BLOOM = {
+    "type": "FeatureCollection",
+    "features": [
+        {
+            "type": "Feature",
+            "geometry": {"type": "Point", "coordinates": [5.002, 45.002]},
+            "properties": {"value": 12.0},
+        }
+    ],
+}
+"""A prior model with one hot spot in that lake."""
 
 Samples = queue.SimpleQueue[tuple[str, bytes]]
 

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import msgspec
 import pytest
-from mission_files import BROKEN_SEED, INFEASIBLE_SEED, Samples, listening, mission_file, revision_of
+from mission_files import BLOOM, BROKEN_SEED, INFEASIBLE_SEED, Samples, listening, mission_file, revision_of
 
 from oxbow import Client, codec
 from oxbow.bus import Bus
@@ -66,6 +66,32 @@ def test_progress_comes_in_order_and_names_each_stage(client: Client) -> None:
     assert fractions[-1] == 1.0
 
 
+def test_a_treatment_is_planned_by_its_own_stages(client: Client) -> None:
+    heard: list[MissionStatus] = []
+    file = mission_file(MissionType="treat", Swath=5.0, PriorModel=BLOOM)
+    mission = client.plan(file, mission_id="treatment", on_status=heard.append)
+    assert mission.slave_path is not None
+    assert len(mission.slave_path) == 3
+    assert mission.master_path is None
+    assert mission.plan is not None
+    assert mission.plan.treatment is not None
+    assert [spot.hot_spot for spot in mission.plan.treatment.hot_spots] == ["features[0]"]
+    assert [status.stage for status in heard if status.stage] == ["contour", "assignment", "certificate"]
+    fractions = [status.fraction for status in heard]
+    assert fractions == sorted(fractions)
+
+
+def test_both_vehicles_are_planned_and_guidance_is_told_the_threshold(client: Client) -> None:
+    threshold = {"Sensor": "chl", "Value": 30.0}
+    client.plan(mission_file(MissionType="adap&treat", Bloom=threshold), mission_id="threshold")
+    with client.plans("threshold", timeout_s=WAIT_S) as updates:
+        mission = next(updates).mission
+    assert mission.bloom is not None
+    assert (mission.bloom.sensor, mission.bloom.value) == ("chl", 30.0)
+    assert mission.master_path is not None
+    assert mission.slave_path is not None
+
+
 def test_the_same_request_is_answered_from_the_store(client: Client) -> None:
     first = client.plan(mission_file(), mission_id="same")
     assert client.plan(first, mission_id="same") == first
@@ -103,7 +129,8 @@ def test_a_deadline_is_kept(client: Client, bus: Bus) -> None:
     ("document", "message"),
     [
         (b"{", "Mission File: is not JSON"),
-        (mission_file(MissionType="treat"), "MissionType: is 'treat'"),
+        (mission_file(MissionType="treat"), "PriorModel: has no hot spot"),
+        (mission_file(Vehicles=[{"Name": "a", "Role": "crew"}]), r"Vehicles\[0\].Role: is \"crew\""),
         (mission_file(Safety=-1), "Safety: is -1"),
         (mission_file(LaunchPoint={"lat": 5.0, "long": 45.0}), "LaunchPoint: .*swapped"),
     ],

@@ -1,4 +1,4 @@
-"""The four stages in one process on the real bus, with trivial answers; the seed says what becomes of a path."""
+"""The stages in one process on the real bus, with trivial answers; the seed says what becomes of a path."""
 
 from __future__ import annotations
 
@@ -13,19 +13,24 @@ from shapely import LineString
 from oxbow import codec
 from oxbow.bus import Session
 from oxbow.contracts import (
+    ASSIGN,
     CERTIFY,
     CONTOUR,
     DECOMPOSE,
     PATH,
+    Assignment,
+    AssignRequest,
     Certificate,
     CertifyRequest,
     ContourRequest,
     DecomposeRequest,
     Decomposition,
+    Endpoint,
     FreeSpace,
     Message,
     PathPlan,
     PathRequest,
+    Sortie,
 )
 from oxbow.errors import Infeasible
 from oxbow.lifetime import Lifetime
@@ -33,6 +38,19 @@ from oxbow.lifetime import Lifetime
 
 def contour(request: ContourRequest) -> FreeSpace:
     return FreeSpace(free=request.outline, water=request.outline, tolerance_m=1.0, compression=1.0)
+
+
+def assign(request: AssignRequest) -> Assignment:
+    vehicle, spots = request.vehicles[0], request.hot_spots
+    path = LineString([vehicle.start, *(spot.area.centroid for spot in spots), vehicle.recovery])
+    sortie = Sortie(
+        vehicle=vehicle.name,
+        path=path,
+        hot_spots=tuple(spot.name for spot in spots),
+        length_m=path.length,
+        duration_s=path.length / vehicle.speed_mps,
+    )
+    return Assignment(sorties=(sortie,), treated_share=(1.0,) * len(spots), makespan_s=sortie.duration_s)
 
 
 def decompose(_request: DecomposeRequest) -> Decomposition:
@@ -78,6 +96,15 @@ def answering(kind: type[Message], handle: Callable[[Any], Message]) -> Callable
     return on_query
 
 
+HANDLERS: tuple[tuple[Endpoint[Any, Any], Callable[[Any], Message]], ...] = (
+    (CONTOUR, contour),
+    (ASSIGN, assign),
+    (DECOMPOSE, decompose),
+    (PATH, path),
+    (CERTIFY, certify),
+)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--connect", required=True)
@@ -85,7 +112,7 @@ def main() -> None:
     options = parser.parse_args()
     lifetime = Lifetime(options.parent)
     with Session.connect(options.connect) as session:
-        for endpoint, handle in ((CONTOUR, contour), (DECOMPOSE, decompose), (PATH, path), (CERTIFY, certify)):
+        for endpoint, handle in HANDLERS:
             session.answer(endpoint.instance_key("trivial"), answering(endpoint.request, handle), workers=4)
             session.declare_live(endpoint.live_key("trivial"))
         lifetime.wait()
