@@ -85,7 +85,7 @@ class Pull:
     """The normal equations of one step: samples pull their feet, segments pull their ends together.
 
     Minimised is the sum of pull * |sample - foot|^2 over the samples, plus tension * |segment|^2 / length over the
-    segments: reweighted least squares (Weiszfeld 1937; Lawson 1961) for a power of the distances and for the
+    segments: reweighted least squares (Weiszfeld 1937) for a power of the distances and for the
     length. Only neighbours along the path share an equation, so that the matrix is tridiagonal.
     """
 
