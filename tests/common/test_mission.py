@@ -298,6 +298,11 @@ def test_examples_and_their_plans_follow_the_schema(path):
         {"Master_length": 0},
         {"MissionType": "adap"},
         {"InBox": SQUARE},
+        {"Swath": 0.0},
+        {"Vehicles": [{"Name": "", "Role": "master"}]},
+        {"Vehicles": [{"Name": "a", "Role": "captain"}]},
+        {"Vehicles": [{"Name": "a", "Role": "master", "Length": 0.0}]},
+        {"Vehicles": [{"Name": "a", "Role": "master", "Start": {"lat": 95.0, "long": 1.0}}]},
     ],
 )
 def test_the_schema_refuses_what_the_parser_refuses(changes):
