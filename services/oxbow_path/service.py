@@ -48,7 +48,7 @@ def handle(request: PathRequest, show: Show) -> PathPlan:
         spacing_m=plan.spacing_m,
         steps=plan.steps,
         dropped=dropped_parts(path, request.space.free, plan.reach_m),
-        warnings=(*_leg_warnings(task), *_length_warnings(plan, request)),
+        warnings=(*_leg_warnings(task), *_length_warnings(plan, task)),
     )
 
 
@@ -84,13 +84,16 @@ def _leg_warnings(task: Task) -> Iterator[str]:
             )
 
 
-def _length_warnings(plan: MethodPlan, request: PathRequest) -> Iterator[str]:
+def _length_warnings(plan: MethodPlan, task: Task) -> Iterator[str]:
+    request = task.request
     share = plan.path.length / request.length_m
     if share < ACCEPTED:
         if plan.spacing_m <= request.min_spacing_m:
             reason = f"Minimal_spatial_rate keeps the spacing at {request.min_spacing_m:g} m"
         elif plan.spacing_m <= finest_spacing_m(request.space):
             reason = f"the water is small, and no spacing below {finest_spacing_m(request.space):.2g} m is planned"
+        elif task.stop():
+            reason = f"its improvement ended after {request.time_limit_s:g} s"
         else:
             reason = "no spacing between those tried fits better"
         yield f"the path uses {share:.1%} of the longest length: {reason}"

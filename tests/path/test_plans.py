@@ -183,3 +183,13 @@ def test_every_step_is_shown():
     assert len([layer for layer in layers if layer.name == "iterations"]) == len(plan.steps)
     assert isinstance(by_name["path"].geometries[0], LineString)
     assert by_name["path"].geometries[0].hausdorff_distance(plan.path) < 1e-6
+
+
+@pytest.mark.parametrize("method", Method)
+def test_a_time_limit_gives_a_sound_path_sooner(method):
+    asked = request(lake(4), spacings=25, method=method, time_limit_s=0.001)
+    layers: list[Layer] = []
+    plan = handle(asked, layers.append)
+    require_sound(plan, asked)
+    assert sum(layer.name == "refinement" for layer in layers) < 10
+    assert plan.path.length >= 0.95 * asked.length_m or "ended after 0.001 s" in " ".join(plan.warnings)

@@ -96,7 +96,8 @@ def refined(
     spacing_m
         The nominal spacing, area / length.
     stop
-        Asked before each step whether time is up. Without a limit the number of steps is fixed by the samples.
+        Asked before each step whether time is up; a path still too long goes on. Without a limit the number of
+        steps is fixed by the samples.
     watch
         Told of every step.
 
@@ -125,7 +126,7 @@ def _states(
         at = feet(path, samples.points, spacing_m)
         weighed_m = at.distance_m * samples.weights
         yield _state(path, weighed_m)
-        if number == last or stop():
+        if number == last or (path.length_m <= length_m and stop()):
             return
         power = POWERS[0] + (POWERS[1] - POWERS[0]) * number / last
         pull = samples.area_weights * _pull(weighed_m, spacing_m / 2, power)

@@ -59,7 +59,7 @@ def space_filling_curve(task: Task, display: Display) -> MethodPlan:
             display.lines("ring", [ring.line], step=number, labels=(f"epoch {number}",))
     path = improved(ring, task, display)
     if not task.budget.fits(path.length):
-        path = start.path
+        path = improved(Polyline.of(start.path, task.waters.passable.free_and_rounding), task, display)
     steps.append(SpacingStep(spacing_m=task.spacing_m, length_m=path.length))
     return MethodPlan(path, task.spacing_m, REACH_NAMED * task.spacing_m / 2, tuple(steps))
 
