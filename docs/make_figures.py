@@ -1,6 +1,7 @@
 """Draw the figures of these documents: an example mission as its stages show it, and plans good and bad.
 
-``python docs/make_figures.py`` writes `stages.png`, `quality.png`, `gaps.png` and `plans.png` in `docs/images`.
+``python docs/make_figures.py`` writes `stages.png`, `quality.png`, `gaps.png`, `plans.png` and `fleet.png` in
+`docs/images`.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from oxbow_certificate.certify import certify
 from oxbow_certificate.distance import PathDistance
 from oxbow_cli.gaps import GAPS, MOST_RADII, draw_gaps
 from oxbow_cli.local import local_call
+from oxbow_cli.picture import draw
 
 FOLDER = Path(__file__).parent
 LAND, WATER, SHORE, INK = "#f4f0e6", "#d3e6ef", "#7d8f96", "#24343b"
@@ -53,6 +55,8 @@ def main() -> None:
     draw_quality(layers, planned, FOLDER / "images" / "quality.png")
     draw_gaps(planned, FOLDER / "images" / "gaps.png", width_px=840)
     draw_plans(FOLDER / "images" / "plans.png")
+    fleet = plan_mission(read_mission(FOLDER / "examples" / "fleet.json"), call=local_call())
+    draw(fleet, FOLDER / "images" / "fleet.png", width_px=1200)
 
 
 def draw_stages(layers: Layers, file: Path) -> None:
@@ -68,13 +72,13 @@ def draw_stages(layers: Layers, file: Path) -> None:
     _titled(panels[1], "decomposition: cells and critical points")
     _draw_cells(panels[1], layers)
 
-    _titled(panels[2], "path: transects and links form a tree; the region round it")
+    _titled(panels[2], "path: the walk round a tree, which the curve starts from")
     _draw_polygons(panels[2], [free], facecolor=WATER, edgecolor=SHORE, linewidth=0.5)
-    _draw_polygons(panels[2], [Polygon(path)], facecolor="#f6c65b", edgecolor="none")
-    _draw_lines(panels[2], layers["path", "transects"].geometries, color=INK, linewidths=0.8)
+    start = layers["path", "start"].geometries[0]
+    _draw_polygons(panels[2], [Polygon(start)], facecolor="#f6c65b", edgecolor=INK, linewidth=0.8)
     _draw_lines(panels[2], layers["path", "circuit"].geometries, color="#c8322b", linewidths=0.8)
 
-    _titled(panels[3], "path: the boundary of that region, with its leg to the launch point")
+    _titled(panels[3], "path: the curve, folded into the water and refined")
     _draw_polygons(panels[3], [free], facecolor=WATER, edgecolor=SHORE, linewidth=0.5)
     _draw_lines(panels[3], [path], color=INK, linewidths=0.8)
     panels[3].plot(*path.coords[0], marker="o", color="white", markeredgecolor=INK, markersize=5)

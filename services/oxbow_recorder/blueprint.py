@@ -13,6 +13,7 @@ def blueprint() -> rrb.Blueprint:
         rrb.Tabs(
             _path(),
             rrb.Spatial2DView(origin="contour", name="Contour"),
+            _assignment(),
             _decomposition(),
             _certificate(),
             rrb.MapView(origin="map", name="Map"),
@@ -65,6 +66,35 @@ def _decomposition() -> rrb.Horizontal:
         ),
         column_shares=[3, 2],
         name="Decomposition",
+    )
+
+
+def _assignment() -> rrb.Horizontal:
+    return rrb.Horizontal(
+        rrb.Spatial2DView(
+            origin="/",
+            name="Shares, and the mesh that they are made of",
+            contents=[
+                "contour/eroded/**",
+                "assignment/mesh/**",
+                "assignment/wavefront/**",
+                "assignment/shares/**",
+            ],
+        ),
+        rrb.Spatial2DView(
+            origin="/",
+            name="Hot spots, passes and sorties",
+            contents=[
+                "contour/eroded/**",
+                "assignment/hot_spots/**",
+                "assignment/passes/**",
+                "assignment/clusters/**",
+                "assignment/routes/**",
+                "assignment/sorties/**",
+                "assignment/further/**",
+            ],
+        ),
+        name="Assignment",
     )
 
 

@@ -25,6 +25,13 @@ PALETTE: dict[tuple[str, str], Colour] = {
     ("contour", "simplified"): (255, 179, 0),
     ("contour", "eroded"): (38, 166, 154),
     ("contour", "dropped"): (229, 57, 53),
+    ("assignment", "mesh"): (55, 71, 79),
+    ("assignment", "shares"): (255, 179, 0),
+    ("assignment", "hot_spots"): (236, 64, 122),
+    ("assignment", "passes"): (144, 164, 174),
+    ("assignment", "routes"): (100, 181, 246),
+    ("assignment", "sorties"): (66, 165, 245),
+    ("assignment", "further"): (186, 104, 200),
     ("decomposition", "cells"): (100, 181, 246),
     ("decomposition", "critical_points"): (255, 112, 67),
     ("path", "iterations"): (186, 104, 200),
@@ -41,7 +48,9 @@ NEAR, FAR = np.array([38, 166, 154]), np.array([229, 57, 53])
 MOST_LABELS = 40
 """More labels than these are kept, but not shown at once."""
 
-ON_MAP = frozenset({("mission", "site"), ("contour", "eroded"), ("path", "path"), ("certificate", "worst_gap")})
+ON_MAP = frozenset(
+    {("mission", "site"), ("contour", "eroded"), ("certificate", "path"), ("certificate", "worst_gap")}
+)
 
 
 @dataclass(frozen=True)

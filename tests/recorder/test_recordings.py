@@ -19,7 +19,7 @@ ENTITIES = """
 /contour/raw /contour/simplified /contour/eroded
 /decomposition/cells /decomposition/critical_points /decomposition/reeb
 /path/iterations /path/transects /path/circuit /path/path /path/loop
-/certificate/gaps /certificate/worst_gap /map/path/path /log/mission
+/certificate/gaps /certificate/worst_gap /map/certificate/path /log/mission
 """
 END = Layer(stage="mission", name="done", kind=LayerKind.LOG, text="done", scalars={"path_s": 1.0})
 
