@@ -29,22 +29,29 @@ def _path() -> rrb.Horizontal:
     return rrb.Horizontal(
         rrb.Spatial2DView(
             origin="/",
-            name="Path: circuit, transects, cuts, path",
+            name="Path, and the tree that it began with",
             contents=[
                 "contour/eroded/**",
                 "path/transects/**",
                 "path/circuit/**",
                 "path/cuts/**",
+                "path/contours/**",
+                "path/links/**",
+                "path/sites/**",
                 "path/path/**",
             ],
         ),
         rrb.Vertical(
             rrb.Spatial2DView(
                 origin="/",
-                name="Spacing loop: path per iteration",
-                contents=["contour/eroded/**", "path/iterations/**"],
+                name="Step by step: spacing loop or ring, then the refinement",
+                contents=["contour/eroded/**", "path/iterations/**", "path/ring/**", "path/refined/**"],
             ),
-            rrb.TimeSeriesView(origin="path/loop", name="Spacing and length per iteration"),
+            rrb.TimeSeriesView(
+                origin="path",
+                name="Length, spacing, distances per step",
+                contents=["$origin/loop/**", "$origin/epochs/**", "$origin/refinement/**"],
+            ),
             row_shares=[3, 1],
         ),
         column_shares=[3, 2],

@@ -54,7 +54,7 @@ def space_filling_curve(task: Task, display: Display) -> MethodPlan:
     for number, epoch in enumerate(_epochs(ring, task)):
         ring = epoch.ring
         figures = {"nodes": len(ring.nodes), "length_m": ring.length_m, "neighbourhood": epoch.width}
-        display.figures("ring", figures, step=number)
+        display.figures("epochs", figures, step=number)
         if number % SHOWN_EVERY == 0:
             display.lines("ring", [ring.line], step=number, labels=(f"epoch {number}",))
     path = improved(ring, task, display)
