@@ -12,7 +12,7 @@ def test_completes_the_file_and_keeps_what_it_does_not_know(oxbow, folder):
     mission = json.loads((folder / "pond.json").read_text())
     assert mission["note"] == "kept"
     assert mission["Master_Path"][0] == mission["Master_Path"][-1] == mission["LaunchPoint"]
-    assert mission["Plan"]["method"] == "Transect"
+    assert mission["Plan"]["method"] == "SpaceFillingCurve"
 
 
 def test_a_name_is_plain_text(oxbow, folder, pond):
@@ -36,7 +36,7 @@ def test_writes_elsewhere_when_asked(oxbow, folder):
     ("fields", "options", "status", "told"),
     [
         ({"Safety": 500.0}, [], 3, ["Safety"]),
-        ({"MissionType": "treat"}, [], 2, ["MissionType", "treat"]),
+        ({"MissionType": "treat"}, [], 2, ["PriorModel", "treat"]),
         ({}, ["--timeout", "0.01"], 4, ["--timeout"]),
         ({}, ["--method", "Spiral"], 2, ["--method", "Spiral", "Transect"]),
         ({}, ["--prior", "prior.json"], 2, ["prior.json"]),

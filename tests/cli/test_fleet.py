@@ -1,0 +1,49 @@
+"""Missions of several vehicles on the command line: planned, evaluated, compared and drawn."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+TREAT = Path(__file__).parents[2] / "docs/examples/treat.json"
+
+
+@pytest.fixture
+def treated(oxbow):
+    result = oxbow("plan", TREAT, "--local", "-o", "treated.json")
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def test_the_table_tells_what_each_vehicle_does_and_what_is_left(treated):
+    assert "tern" in treated
+    assert "treats features[0]" in treated
+    assert "100.0% treated" in treated
+    assert "further sortie" in treated
+
+
+@pytest.mark.usefixtures("treated")
+def test_every_vehicle_is_evaluated(oxbow):
+    found = json.loads(oxbow("evaluate", "treated.json", "--json").stdout)
+    assert [vehicle["name"] for vehicle in found["vehicles"]] == ["tern", "gull"]
+    assert found["length_m"] == pytest.approx(sum(vehicle["length_m"] for vehicle in found["vehicles"]))
+    assert found["length_ratio"] == max(vehicle["length_ratio"] for vehicle in found["vehicles"])
+    assert "Path of gull" in oxbow("evaluate", "treated.json").stdout
+
+
+@pytest.mark.usefixtures("treated")
+def test_a_path_of_a_vehicle_that_takes_no_part_is_named(oxbow, folder):
+    mission = json.loads((folder / "treated.json").read_text())
+    mission["Paths"][0]["Name"] = "auk"
+    (folder / "treated.json").write_text(json.dumps(mission))
+    result = oxbow("evaluate", "treated.json")
+    assert result.returncode == 2
+    assert "Paths: has a path of 'auk'; expected one of tern, gull" in result.stderr
+
+
+@pytest.mark.usefixtures("treated")
+def test_all_paths_are_drawn_with_their_names(oxbow, folder):
+    assert oxbow("picture", "treated.json", "-o", "treated.svg").returncode == 0
+    drawn = (folder / "treated.svg").read_text()
+    assert all(name in drawn for name in ("tern", "gull", "4 hot spots"))
+    assert oxbow("picture", "treated.json", "--gaps", "-o", "gaps.svg").returncode == 0
