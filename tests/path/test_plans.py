@@ -70,7 +70,7 @@ def test_launch_inside_the_water(seed):
 
 
 @pytest.mark.parametrize("name", sorted(nasty_polygons()))
-@pytest.mark.parametrize("spacings", [3.0, 20.0])
+@pytest.mark.parametrize("spacings", [3.0, 12.0])
 @pytest.mark.parametrize("method", Method)
 def test_nasty_shapes(name, spacings, method):
     water = nasty_polygons()[name]

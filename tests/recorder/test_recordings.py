@@ -18,7 +18,7 @@ LAKE = Path(__file__).parents[2] / "docs/examples/lake.json"
 ENTITIES = """
 /contour/raw /contour/simplified /contour/eroded
 /decomposition/cells /decomposition/critical_points /decomposition/reeb
-/path/iterations /path/transects /path/circuit /path/path /path/loop
+/path/circuit /path/start /path/ring /path/epochs /path/refined /path/refinement /path/path
 /certificate/gaps /certificate/worst_gap /map/certificate/path /log/mission
 """
 END = Layer(stage="mission", name="done", kind=LayerKind.LOG, text="done", scalars={"path_s": 1.0})
