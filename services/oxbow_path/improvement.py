@@ -9,9 +9,10 @@ from shapely import LineString
 from oxbow.contracts import SpacingStep
 from oxbow_path.refinement import Polyline, refined
 from oxbow_path.task import Display, MethodPlan, Task
+from oxbow_path.walk.spacing import Fit
 from oxbow_path.walk.trial import Trial
 
-__all__ = ["improved", "method_plan"]
+__all__ = ["improved", "method_plan", "spacing_steps"]
 
 
 def improved(path: Polyline, task: Task, display: Display) -> LineString:
@@ -28,7 +29,12 @@ def improved(path: Polyline, task: Task, display: Display) -> LineString:
     )
 
 
-def method_plan(path: LineString, chosen: Trial, trials: Sequence[Trial]) -> MethodPlan:
+def method_plan(path: LineString, fit: Fit) -> MethodPlan:
     """The plan of a method that fits a spacing: the path that the chosen trial became, and all trials."""
-    steps = tuple(SpacingStep(spacing_m=trial.pattern.spacing_m, length_m=trial.length_m) for trial in trials)
-    return MethodPlan(path, chosen.pattern.spacing_m, chosen.pattern.reach_m, steps)
+    chosen = fit.chosen.pattern
+    return MethodPlan(path, chosen.spacing_m, chosen.reach_m, spacing_steps(fit.trials))
+
+
+def spacing_steps(trials: Sequence[Trial]) -> tuple[SpacingStep, ...]:
+    """The spacings tried, and the lengths that they gave."""
+    return tuple(SpacingStep(spacing_m=trial.pattern.spacing_m, length_m=trial.length_m) for trial in trials)

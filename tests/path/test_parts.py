@@ -11,13 +11,12 @@ from path_requests import lake, request
 from shapely import LinearRing, LineString, Point, Polygon, box
 
 from oxbow.contracts import PathRequest
-from oxbow.errors import Internal
+from oxbow.errors import Infeasible, Internal
 from oxbow.reeb import cell_polygon
 from oxbow_path.conformance import require_conforming
-from oxbow_path.task import Task, prepared_waters
+from oxbow_path.task import prepared_waters
 from oxbow_path.transect.circuit import plan_circuit
 from oxbow_path.transect.pattern import try_transects
-from oxbow_path.transect.planner import plan_transects
 from oxbow_path.transect.transects import place_transects
 from oxbow_path.walk.gaps import reach_gaps
 from oxbow_path.walk.legs import Passable, access, joined
@@ -231,31 +230,23 @@ def trial_of(length_m: float, spacing_m: float) -> Trial:
 @pytest.mark.parametrize("power", [0.6, 1.0, 1.6])
 def test_the_spacing_loop_finds_the_length(power):
     budget = Budget(limit_m=1000.0)
-    trials = fitted(
-        lambda pattern: trial_of(30_000.0 / pattern.spacing_m**power, pattern.spacing_m),
-        Pattern(10.0, 1.5, 0.25),
-        budget,
-    )
-    assert budget.is_enough(trials[-1])
-    assert len(trials) <= 6
+    fit = fitted(lambda pattern: trial_of(30_000.0 / pattern.spacing_m**power, pattern.spacing_m), 10.0, budget)
+    assert budget.is_enough(fit.chosen)
+    assert len(fit.trials) <= 6
 
 
 def test_the_spacing_loop_keeps_the_least_spacing():
     budget = Budget(limit_m=1000.0, least_spacing_m=80.0)
-    trials = fitted(
-        lambda pattern: trial_of(30_000.0 / pattern.spacing_m, pattern.spacing_m), Pattern(10.0, 1.5, 0.25), budget
-    )
-    assert [trial.pattern.spacing_m for trial in trials] == [80.0]
+    fit = fitted(lambda pattern: trial_of(30_000.0 / pattern.spacing_m, pattern.spacing_m), 10.0, budget)
+    assert [trial.pattern.spacing_m for trial in fit.trials] == [80.0]
 
 
-def test_the_remainder_is_spent_and_never_makes_a_gap_deeper():
-    asked = request(lake(5), spacings=14)
-    plan = plan_transects(Task.of(asked, stop=lambda: False))
-    fitting = [trial for trial in plan.trials if trial.length_m <= 0.999 * asked.length_m]
-    same = next(trial for trial in fitting if trial.pattern == plan.chosen.pattern)
-    assert same.length_m <= plan.chosen.length_m <= asked.length_m
-    distances = prepared_waters(asked, asked.space.free.area / asked.length_m).probe.distances
-    assert distances(plan.chosen.path).max() <= distances(same.path).max()
+def test_where_nothing_fits_the_shortest_path_is_named():
+    def never_short(pattern: Pattern) -> Trial:
+        return trial_of(2000.0 + 1e5 / pattern.spacing_m, pattern.spacing_m)
+
+    with pytest.raises(Infeasible, match="is 1000 m; the shortest path from launch to recovery is 2000 m"):
+        fitted(never_short, 10.0, Budget(limit_m=1000.0), widest_m=1e4)
 
 
 def test_a_pattern_is_built_the_same_whatever_was_built_before():

@@ -256,10 +256,10 @@ def planned(asked: PathRequest) -> TourPlan:
 
 
 def require_sound(plan: TourPlan, asked: PathRequest) -> None:
-    """Simple, as long as allowed, from launch to recovery, and outside the free space only for its legs."""
+    """Simple, no longer than allowed, from launch to recovery, and outside the free space only for its legs."""
     task, path = Task.of(asked, lambda: False), plan.chosen.path
     assert path.is_simple
-    assert 0.95 * asked.length_m <= path.length <= task.budget.most_m
+    assert path.length <= task.budget.most_m
     for access, end in ((task.waters.launch, path.coords[0]), (task.waters.recovery, path.coords[-1])):
         assert Point(end).distance(Point(access.place)) <= 1e-6
     legs = shapely.union_all([task.waters.launch.beside, task.waters.recovery.beside])

@@ -21,11 +21,10 @@ from oxbow.testing import nasty_polygons
 from oxbow_path.conformance import require_conforming
 from oxbow_path.task import Display, Task
 from oxbow_path.walk.routes import Routes
-from oxbow_path.walk.spacing import Budget
+from oxbow_path.walk.spacing import Budget, Fit
 from oxbow_path.walk.trial import Waters
 from oxbow_path.watershed import (
     CellPath,
-    WatershedPlan,
     coverage_depth,
     plan_watershed,
     shortest_path,
@@ -138,7 +137,7 @@ def waters_of(asked: PathRequest) -> Waters:
     return Task.of(asked, lambda: False).waters
 
 
-def planned(asked: PathRequest) -> WatershedPlan:
+def planned(asked: PathRequest) -> Fit:
     """A plan whose path was checked in the planar frame."""
     plan = plan_watershed(waters_of(asked), Budget(asked.length_m))
     back = partial(from_sweep, heading_rad=asked.decomposition.heading_rad)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 from oxbow.contracts import SpacingStep
@@ -13,6 +12,7 @@ from oxbow_path.ring.draws import drawn_places
 from oxbow_path.ring.kohonen import Epoch, Schedule, organised
 from oxbow_path.task import SHOWN_EVERY, Display, MethodPlan, Task
 from oxbow_path.transect import try_transects
+from oxbow_path.walk.remainder import with_remainder
 from oxbow_path.walk.trial import Pattern, Trial
 
 __all__ = ["space_filling_curve"]
@@ -22,9 +22,8 @@ START_SPACINGS = (2.0, 3.0, 5.0, 8.0)
 which folds it into the water without a preferred direction.
 """
 
-REACH = 1.5
-PHASE = 0.25
-"""Of the first walk: see `Pattern`."""
+LEAST_START = 0.35
+"""Share of the longest length below which the ring would have to find its way by itself: it gets spurs first."""
 
 EPOCHS = 30
 """Updates of the ring."""
@@ -66,11 +65,11 @@ def space_filling_curve(task: Task, display: Display) -> MethodPlan:
 
 def _start(task: Task) -> Trial:
     """The walk over the circuit of the cells, as coarse as it must be to fit; at last without transects."""
-    x0, y0, x1, y1 = task.waters.free.bounds
-    for spacing_m in (*(factor * task.spacing_m for factor in START_SPACINGS), 2 * math.hypot(x1 - x0, y1 - y0)):
-        trial = try_transects(task.waters, Pattern(spacing_m, REACH, PHASE))
+    for spacing_m in (*(factor * task.spacing_m for factor in START_SPACINGS), task.waters.widest_m):
+        trial = try_transects(task.waters, Pattern(spacing_m))
         if task.budget.fits(trial.length_m):
-            return trial
+            is_starved = trial.length_m < LEAST_START * task.budget.limit_m
+            return with_remainder(trial, task.waters, task.budget) if is_starved else trial
     raise Infeasible(
         f"is {task.request.length_m:.0f} m; the shortest path from launch to recovery is {trial.length_m:.0f} m",
         "Master_length",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from shapely import Point
 
-from oxbow_path.improvement import improved, method_plan
+from oxbow_path.improvement import improved, spacing_steps
 from oxbow_path.refinement import Polyline
 from oxbow_path.task import Display, MethodPlan, Task
 from oxbow_path.tour.planner import plan_tour
@@ -29,4 +29,5 @@ def tour(task: Task, display: Display) -> MethodPlan:
     display.lines("sites", [Point(site) for site in chosen.tour.sites])
     display.lines("tour", [chosen.tour.way])
     path = Polyline.of(chosen.path, task.waters.passable.free_and_rounding)
-    return method_plan(improved(path, task, display), chosen.trial, [trial.trial for trial in plan.trials])
+    steps = spacing_steps([trial.trial for trial in plan.trials])
+    return MethodPlan(improved(path, task, display), chosen.spacing_m, chosen.trial.pattern.reach_m, steps)

@@ -63,9 +63,6 @@ CLEAR_M = 1e-9
 LANE = 0.1
 """Half width of a lane, in pitches."""
 
-REACH = 1.5
-"""How far water may stay from the path where an island's far side is left out, in half pitches."""
-
 
 @dataclass(frozen=True)
 class Tour:
@@ -208,7 +205,7 @@ class _Attempt:
     def path(self, tour: Tour) -> TourTrial:
         """The path round a tour."""
         waters, lane_m = self.waters, LANE * tour.pitch_m
-        pattern = Pattern(tour.pitch_m, REACH, 0.0)
+        pattern = Pattern(tour.pitch_m)
         walk = simply_connected(
             enclosed(shapely.get_coordinates(tour.way), waters.free, lane_m),
             waters.free,

@@ -1,4 +1,8 @@
-"""The remainder: what length a fitted path leaves unused is spent on the worst gaps."""
+"""The remainder: length that no spacing could use is spent on the worst gaps.
+
+Where the length is short for the water, no spacing may fit but one that leaves most of it unused. The refinement
+moves what is there, and cannot see round a headland; spurs can.
+"""
 
 from __future__ import annotations
 
@@ -34,9 +38,9 @@ LEAST_CLEARANCE_M = 1e-8
 def with_remainder(trial: Trial, waters: Waters, budget: Budget) -> Trial:
     """Add spurs to the worst gaps, one after another, while they fit the length and make no gap deeper.
 
-    A trial at the least spacing that is wanted stays as it is.
+    A trial that uses the length well enough stays as it is: the refinement spends the rest better.
     """
-    if trial.pattern.spacing_m <= budget.least_spacing_m:
+    if budget.is_enough(trial):
         return trial
     for _ in range(SPURS):
         left_m = budget.most_m - trial.length_m

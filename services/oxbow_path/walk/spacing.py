@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
-
-import numpy as np
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from oxbow.errors import Infeasible
-from oxbow_path.walk.trial import Pattern, Trial, Waters
+from oxbow_path.walk.trial import Pattern, Trial
 
-__all__ = ["Budget", "best_trial", "fitted"]
+__all__ = ["Budget", "Fit", "fitted"]
 
 MOST, ENOUGH = 0.999, 0.97
 """Shares of the longest length that a path may, and should, use."""
 
 TURNS = 8
-"""Trials for one pattern before the best so far is taken."""
+"""Trials before the best so far is taken."""
 
 LEAST_STEP = 0.1
 """Least share of the way between two known spacings that a trial lies from either."""
@@ -53,21 +51,60 @@ class Budget:
         )
 
 
-def fitted(attempt: Callable[[Pattern], Trial], start: Pattern, budget: Budget) -> list[Trial]:
-    """All trials of one pattern, until a spacing uses the length well.
+@dataclass(frozen=True)
+class Fit:
+    """The trial that uses the length best, and all others, in the order of trying."""
+
+    chosen: Trial
+    trials: tuple[Trial, ...]
+
+
+def fitted(
+    attempt: Callable[[Pattern], Trial], first_spacing_m: float, budget: Budget, *, widest_m: float = math.inf
+) -> Fit:
+    """Try spacings until one uses the length well.
 
     The report multiplies the spacing by length / limit. This does the same, with the sensitivity that the last two
     trials showed, until a spacing too small and one too large are known; then it interpolates between the two.
+
+    Parameters
+    ----------
+    attempt
+        Builds the path for a pattern.
+    first_spacing_m
+        Where to begin.
+    budget
+        What fits, and what is enough.
+    widest_m
+        A spacing that leaves nothing but the way from launch to recovery: the last to be tried, if nothing fits.
+
+    Raises
+    ------
+    Infeasible
+        Nothing fits: even the shortest way from launch to recovery is longer than the vehicle can go.
     """
     trials: list[Trial] = []
-    spacing_m = max(start.spacing_m, budget.least_spacing_m)
+    spacing_m = max(first_spacing_m, budget.least_spacing_m)
     while len(trials) < TURNS:
-        trial = attempt(replace(start, spacing_m=spacing_m))
-        trials.append(trial)
-        if budget.is_enough(trial):
+        trials.append(attempt(Pattern(spacing_m)))
+        if budget.is_enough(trials[-1]):
             break
         spacing_m = max(_next_spacing(trials, budget), budget.least_spacing_m)
-    return trials
+    if math.isfinite(widest_m) and not any(budget.fits(trial.length_m) for trial in trials):
+        trials.append(attempt(Pattern(widest_m)))
+    return Fit(_longest(trials, budget), tuple(trials))
+
+
+def _longest(trials: Sequence[Trial], budget: Budget) -> Trial:
+    """The longest trial that fits."""
+    fitting = [trial for trial in trials if budget.fits(trial.length_m)]
+    if fitting:
+        return max(fitting, key=lambda trial: trial.length_m)
+    shortest_m = min(trial.length_m for trial in trials)
+    raise Infeasible(
+        f"is {budget.limit_m:.0f} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
+        "Master_length",
+    )
 
 
 def _next_spacing(trials: Sequence[Trial], budget: Budget) -> float:
@@ -84,30 +121,3 @@ def _next_spacing(trials: Sequence[Trial], budget: Budget) -> float:
         seen = (points[-2][1] - points[-1][1]) / (points[-1][0] - points[-2][0])
         sensitivity = min(max(seen, SENSITIVITY / 2), SENSITIVITY * 2)
     return math.exp(points[-1][0] + (points[-1][1] - target) / sensitivity)
-
-
-def best_trial(trials: Iterable[Trial], waters: Waters, budget: Budget) -> Trial:
-    """The trial that fits and leaves the least distance, the largest and the 95th percentile together.
-
-    A path much shorter than allowed is charged for what it leaves unused.
-
-    Raises
-    ------
-    Infeasible
-        None fits: even the shortest way from launch to recovery is longer than the vehicle can go.
-    """
-    trials = tuple(trials)
-    fitting = [trial for trial in trials if budget.fits(trial.length_m)]
-    if not fitting:
-        shortest_m = min(trial.length_m for trial in trials)
-        raise Infeasible(
-            f"is {budget.limit_m:.0f} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
-            "Master_length",
-        )
-
-    def score_m(trial: Trial) -> float:
-        distance_m = waters.probe.distances(trial.path)
-        unused = max(0.0, budget.enough_m / trial.length_m - 1.0)
-        return float(distance_m.max() + np.quantile(distance_m, 0.95)) * (1.0 + unused)
-
-    return min(fitting, key=score_m)

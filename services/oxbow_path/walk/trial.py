@@ -51,6 +51,12 @@ class Waters:
     recovery: Access
 
     @property
+    def widest_m(self) -> float:
+        """A spacing at which the water has no transect, and no gap."""
+        x0, y0, x1, y1 = self.free.bounds
+        return 2 * math.hypot(x1 - x0, y1 - y0)
+
+    @property
     def entries(self) -> tuple[Point, Point]:
         """Where the legs from launch and to recovery meet the free space."""
         return self.launch.entry, self.recovery.entry
@@ -65,8 +71,8 @@ class Pattern:
     """
 
     spacing_m: float
-    reach: float
-    phase: float
+    reach: float = 1.5
+    phase: float = 0.25
 
     @property
     def half_width_m(self) -> float:

@@ -9,30 +9,21 @@ the way back: the path ends where it began, is simple, and stays inside by const
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 
 from oxbow_path.improvement import improved, method_plan
 from oxbow_path.refinement import Polyline
 from oxbow_path.task import Display, MethodPlan, Task
 from oxbow_path.walk.remainder import with_remainder
-from oxbow_path.walk.spacing import Budget, best_trial, fitted
+from oxbow_path.walk.spacing import Budget, Fit, fitted
 from oxbow_path.walk.trial import Pattern, Trial, Waters, walked
 from oxbow_path.watershed.contours import contour_tree
 
-__all__ = ["WatershedPlan", "plan_watershed", "try_contours", "watershed"]
+__all__ = ["plan_watershed", "try_contours", "watershed"]
 
-REACHES = (1.5, 1.3, 1.8)
 FIRST_SPACING = 1.15
 """The first spacing tried, in nominal spacings: ways in and branches cost about as much."""
-
-
-@dataclass(frozen=True)
-class WatershedPlan:
-    """The chosen trial and all others, in the order of trying; sweep frame."""
-
-    chosen: Trial
-    trials: tuple[Trial, ...]
 
 
 def watershed(task: Task, display: Display) -> MethodPlan:
@@ -43,34 +34,26 @@ def watershed(task: Task, display: Display) -> MethodPlan:
     Infeasible
         No path that was tried is short enough.
     """
-    plan = plan_watershed(task.waters, task.budget)
-    for step, trial in enumerate(plan.trials):
+    fit = plan_watershed(task.waters, task.budget)
+    for step, trial in enumerate(fit.trials):
         display.lines("iterations", [trial.path], step=step, labels=(f"spacing {trial.pattern.spacing_m:.1f} m",))
-    display.lines("contours", plan.chosen.circuit.transects)
-    display.lines("links", plan.chosen.circuit.links)
-    path = Polyline.of(plan.chosen.path, task.waters.passable.free_and_rounding)
-    return method_plan(improved(path, task, display), plan.chosen, plan.trials)
+    display.lines("contours", fit.chosen.circuit.transects)
+    display.lines("links", fit.chosen.circuit.links)
+    path = Polyline.of(fit.chosen.path, task.waters.passable.free_and_rounding)
+    return method_plan(improved(path, task, display), fit)
 
 
-def plan_watershed(waters: Waters, budget: Budget) -> WatershedPlan:
-    """The best of several reaches, each fitted to the length.
-
-    Parameters
-    ----------
-    waters
-        Where the path may run, and how launch and recovery points are reached.
-    budget
-        How long the path may be, and how long it should be.
+def plan_watershed(waters: Waters, budget: Budget) -> Fit:
+    """The walk round contours, at the spacing that uses the length best.
 
     Raises
     ------
     Infeasible
-        No path that was tried is short enough.
+        Even the shortest way from launch to recovery is longer than the vehicle can go.
     """
-    first_m = FIRST_SPACING * waters.spacing_m
     attempt = partial(try_contours, waters)
-    trials = tuple(trial for reach in REACHES for trial in fitted(attempt, Pattern(first_m, reach, 0.0), budget))
-    return WatershedPlan(with_remainder(best_trial(trials, waters, budget), waters, budget), trials)
+    fit = fitted(attempt, FIRST_SPACING * waters.spacing_m, budget, widest_m=waters.widest_m)
+    return replace(fit, chosen=with_remainder(fit.chosen, waters, budget))
 
 
 def try_contours(waters: Waters, pattern: Pattern) -> Trial:
