@@ -35,7 +35,7 @@ imports: $(READY)
 	$(BIN)/lint-imports
 
 pytest: $(READY)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
 bench: $(READY) ## Measure planning, the bus and the stack; results in out/bench.json.
 	$(BIN)/python tests/bench/run.py
