@@ -13,7 +13,7 @@ __all__ = ["handle"]
 STAGE = "certificate"
 RED = (214, 47, 39)
 
-GAP_RATIO = 1.5
+GAP_RATIO = 1.1
 """Places farther from the path than so many least radii are shown as gaps; ideal transects have none above 1."""
 
 RULES = ("length_m", "outside_m", "unsafe_m", "judged_area", "crossings", "turns")

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from shapely import Point, Polygon, affinity, box
 
@@ -81,11 +81,14 @@ def test_free_space_is_inside_the_true_outline_less_the_safety_distance(site, sa
 
 @settings(max_examples=40, deadline=None)
 @given(sites, st.sampled_from([0.5, 3.0]))
+@example(ragged_site(0, 225, 0.9, 0), 3.0)
 def test_by_default_only_a_strip_along_the_shore_is_lost(site, safety_m):
     outline, zones = site
     spacing_m = 10.0
     water = outline.difference(shapely.union_all(list(zones)))
-    exact = max(shapely.get_parts(water.buffer(-safety_m, quad_segs=32)), key=shapely.area, default=Polygon())
+    # Straits that the safety distance leaves open by less than the finest tolerance may be taken for closed.
+    parts = shapely.get_parts(water.buffer(-safety_m - spacing_m / 500, quad_segs=32))
+    exact = max(parts, key=shapely.area, default=Polygon())
     if exact.area < spacing_m**2:
         return
     free = free_space(outline, zones, safety_m, spacing_m).free
