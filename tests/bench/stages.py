@@ -14,6 +14,7 @@ from lakes import lake
 from results import Figure, Section
 
 from oxbow.contracts import STAGES, Endpoint, Message
+from oxbow.errors import OxbowError
 from oxbow.mission import Mission, mission_json, parse_mission
 from oxbow.pipeline import Call, plan_mission
 from oxbow_cli.local import local_call
@@ -89,6 +90,8 @@ def _timed_plan(mission: Mission) -> dict[str, Figure]:
     except TimeoutError:
         *done, at_work = call.seconds.items()
         return {**dict(done), at_work[0]: f"> {at_work[1]:.3g}", "total": f"> {LIMIT_S:g}"}
+    except OxbowError as error:
+        return {**call.seconds, "total": error.code}
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
     total_s = time.perf_counter() - started
