@@ -61,7 +61,9 @@ def oxbow(
 @app.command()
 def plan(
     file: MissionFile,
-    method: Annotated[str, typer.Option(help="How to generate the path.")] = "SpaceFillingCurve",
+    method: Annotated[
+        str, typer.Option(help="SpaceFillingCurve, Tour, Transect or Watershed.")
+    ] = "SpaceFillingCurve",
     prior: Annotated[
         Path | None,
         typer.Option(
