@@ -89,6 +89,22 @@ def test_legs_outside_the_free_space_stay():
     assert (moved.nodes[~path.pinned] == path.nodes[~path.pinned] + np.array([0.0, 50.0])).all()
 
 
+def test_one_sharp_place_does_not_hold_the_rest():
+    needle = [(700, 100), (700, 400), (701, 100), (950, 50)]
+    line = LineString([(50, 50), (50, 900), (900, 900), (950, 60), *needle[::-1][1:], (400, 50), (50, 50)])
+    assert line.is_simple
+    path = Polyline.of(line, SQUARE.buffer(1e-6)).divided(60.0)
+    guard = Guard(SQUARE.buffer(1e-6), 5.0)
+    assert guard.faults(path).any()
+    target = path.nodes + np.where(path.nodes[:, :1] < 300, 20.0, 0.0)
+    moved = guard.moved(path, target)
+    assert moved.line.is_simple
+    assert (moved.nodes[1:-1] == target[1:-1]).all()
+    refined_path = refine(line, SQUARE, 1.3 * line.length)
+    assert conforms(refined_path, SQUARE)
+    assert refined_path.length >= 1.2 * line.length
+
+
 def test_stretches_keep_their_distance():
     path = Polyline.of(LineString([(0, 0), (0, 900), (300, 900), (300, 0), (0, 0)]), SQUARE.buffer(1e-6))
     path = path.divided(100.0)

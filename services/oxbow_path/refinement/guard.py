@@ -31,8 +31,8 @@ LOCAL_ROUNDS = 8
 
 ROUNDS = 14
 
-FOLD = -0.9999
-"""Cosine of the turn at which a node folds its two segments onto each other."""
+FOLD, RETURN = -0.9999, -1.0 + 1e-9
+"""Cosines of the turn at which a node folds its two segments nearly, and as good as wholly, onto each other."""
 
 
 @dataclass(frozen=True)
@@ -57,34 +57,47 @@ class Guard:
         near_m = shapely.distance(segments[first], segments[second])
         return cls(grown, min([CLEARANCE * spacing_m, *(near_m / 2)]))
 
-    def faults(self, path: Polyline, suspect: BoolArray | None = None) -> BoolArray:
+    def faults(
+        self, path: Polyline, suspect: BoolArray | None = None, excused: BoolArray | None = None
+    ) -> BoolArray:
         """Which segments (n - 1,) leave the free space, or meet, fold onto or come too near another.
 
-        Where only some segments are suspect, the others are known to be at fault with none but those.
+        Where only some segments are suspect, the others are known to be at fault with none but those. Excused ones
+        may come near and fold sharply, but neither meet another nor run back on themselves.
         """
         segments = path.segments
         asked = np.arange(len(segments)) if suspect is None else np.flatnonzero(suspect)
+        excused = path.legs if excused is None else path.legs | excused
         fault = np.zeros(len(segments), dtype=bool)
         fault[asked] = ~shapely.covers(self.free, segments[asked]) & ~path.legs[asked]
         index, other = STRtree(segments).query(segments[asked], predicate="dwithin", distance=self.clearance_m)
         near = _beyond(path, np.stack([asked[index], other]), 1)
         # Neighbours but one, and legs, which begin side by side, may come near, but not meet.
-        excused = (_steps_between(path, near) <= NEIGHBOURS) | path.legs[near].any(axis=0)
-        excused &= ~shapely.intersects(segments[near[0]], segments[near[1]])
-        fault[near[:, ~excused]] = True
-        folded = _folded(path)
+        may_be_near = (_steps_between(path, near) <= NEIGHBOURS) | excused[near].any(axis=0)
+        may_be_near &= ~shapely.intersects(segments[near[0]], segments[near[1]])
+        fault[near[:, ~may_be_near]] = True
+        folded = _folded(path, FOLD) & ~(excused[:-1] & excused[1:]) | _folded(path, RETURN)
         fault[:-1] |= folded
         fault[1:] |= folded
         return fault
 
     def moved(self, path: Polyline, target: FloatArray) -> Polyline:
-        """The path with its nodes as far on the way to `target` (n, 2) as keeps it inside and simple."""
+        """The path with its nodes as far on the way to `target` (n, 2) as keeps it inside and simple.
+
+        What is too near or too sharp in the path as it is must not hold all the rest: it is excused.
+        """
+        moved = self._moved(path, target, None)
+        if moved is None:
+            moved = self._moved(path, target, self.faults(path))
+        return path if moved is None else moved
+
+    def _moved(self, path: Polyline, target: FloatArray, excused: BoolArray | None) -> Polyline | None:
         step = np.where(path.pinned[:, None], 0.0, target - path.nodes)
         share = np.ones(len(path.nodes))
         suspect: BoolArray | None = None
         for turn in range(ROUNDS):
             moved = path.moved(path.nodes + share[:, None] * step)
-            fault = self.faults(moved, suspect)
+            fault = self.faults(moved, suspect, excused)
             if not fault.any():
                 return moved
             blamed = _ends(fault)
@@ -93,22 +106,23 @@ class Guard:
                 blamed[:-1] |= blamed[1:]
             share[blamed] = share[blamed] / 2 if turn < HALVINGS else 0.0
             suspect = blamed[:-1] | blamed[1:]
-        return path
+        return None
 
     def thinned(self, path: Polyline, drop: BoolArray) -> Polyline:
         """The path without the nodes to drop, but for those whose loss would put it at fault."""
-        for _ in range(ROUNDS):
+        before = self.faults(path) if drop.any() else np.zeros(len(path.legs), dtype=bool)
+        drop = drop & ~_ends(before)
+        while drop.any():
             kept = np.flatnonzero(~drop)
+            merged = np.diff(kept) > 1
             thinner = path.without(drop)
-            fault = self.faults(thinner, suspect=np.diff(kept) > 1)
-            if not fault.any():
-                return thinner
+            fault = self.faults(thinner, suspect=merged, excused=before[kept[:-1]])
+            if not (fault & merged).any():
+                return path if fault.any() else thinner
             restored = np.zeros(len(drop) + 1, dtype=int)
             np.add.at(restored, kept[:-1][fault], 1)
             np.add.at(restored, kept[1:][fault], -1)
             drop = drop & (np.cumsum(restored)[:-1] == 0)
-            if not drop.any():
-                break
         return path
 
 
@@ -129,8 +143,8 @@ def _ends(segment: BoolArray) -> BoolArray:
     return np.asarray(np.append(segment, False) | np.append(False, segment))
 
 
-def _folded(path: Polyline) -> BoolArray:
-    """Which inner nodes (n - 2,) fold the path back onto itself."""
+def _folded(path: Polyline, cosine: float) -> BoolArray:
+    """At which inner nodes (n - 2,) the turn's cosine is less."""
     edge = np.diff(path.nodes, axis=0)
     product = path.lengths_m[:-1] * path.lengths_m[1:]
-    return np.asarray((edge[:-1] * edge[1:]).sum(axis=1) < FOLD * np.maximum(product, np.finfo(float).tiny))
+    return np.asarray((edge[:-1] * edge[1:]).sum(axis=1) < cosine * np.maximum(product, np.finfo(float).tiny))
