@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from oxbow.contracts import SpacingStep
 from oxbow.errors import Infeasible
 from oxbow_path.improvement import improved
@@ -25,8 +27,11 @@ which folds it into the water without a preferred direction.
 LEAST_START = 0.35
 """Share of the longest length below which the ring would have to find its way by itself: it gets spurs first."""
 
-EPOCHS = 30
-"""Updates of the ring."""
+EPOCHS = (8, 30)
+"""Fewest and most updates of the ring."""
+
+WORK = 3_000_000
+"""Updates times draws: very long paths get fewer updates."""
 
 REACH_NAMED = 2.0
 """Water farther from the path than so many half spacings is named as dropped."""
@@ -78,7 +83,8 @@ def _start(task: Task) -> Trial:
 
 def _epochs(ring: Polyline, task: Task) -> Iterator[Epoch]:
     request = task.request
-    draws = drawn_places(task.waters.cells, len(task.samples), seed=request.seed, draw=request.draw)
+    count = len(task.samples)
+    draws = drawn_places(task.waters.cells, count, seed=request.seed, draw=request.draw)
     return organised(
         ring,
         draws,
@@ -86,6 +92,6 @@ def _epochs(ring: Polyline, task: Task) -> Iterator[Epoch]:
         Guard.of(task.waters.free, ring, task.spacing_m),
         length_m=task.useful_length_m,
         spacing_m=task.spacing_m,
-        schedule=Schedule(EPOCHS),
+        schedule=Schedule(int(np.clip(WORK // count, *EPOCHS))),
         stop=task.stop,
     )
