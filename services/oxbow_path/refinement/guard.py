@@ -110,19 +110,25 @@ class Guard:
 
     def thinned(self, path: Polyline, drop: BoolArray) -> Polyline:
         """The path without the nodes to drop, but for those whose loss would put it at fault."""
-        before = self.faults(path) if drop.any() else np.zeros(len(path.legs), dtype=bool)
-        drop = drop & ~_ends(before)
+        before: BoolArray | None = None
         while drop.any():
             kept = np.flatnonzero(~drop)
             merged = np.diff(kept) > 1
             thinner = path.without(drop)
-            fault = self.faults(thinner, suspect=merged, excused=before[kept[:-1]])
-            if not (fault & merged).any():
-                return path if fault.any() else thinner
-            restored = np.zeros(len(drop) + 1, dtype=int)
-            np.add.at(restored, kept[:-1][fault], 1)
-            np.add.at(restored, kept[1:][fault], -1)
-            drop = drop & (np.cumsum(restored)[:-1] == 0)
+            fault = self.faults(thinner, merged, None if before is None else before[kept[:-1]])
+            if not fault.any():
+                return thinner
+            if (fault & merged).any():
+                restored = np.zeros(len(drop) + 1, dtype=int)
+                np.add.at(restored, kept[:-1][fault], 1)
+                np.add.at(restored, kept[1:][fault], -1)
+                drop = drop & (np.cumsum(restored)[:-1] == 0)
+            elif before is None:
+                # What is at fault was so before: it is excused, and stays as it is.
+                before = self.faults(path)
+                drop = drop & ~_ends(before)
+            else:
+                break
         return path
 
 
