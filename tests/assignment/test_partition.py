@@ -1,7 +1,6 @@
 """Shares tile the mesh, hang together, and are as large as capacities ask for."""
 
 import math
-from pathlib import Path
 
 import networkx as nx
 import numpy as np
@@ -22,10 +21,10 @@ from oxbow.site import Site
 from oxbow.testing import nasty_polygons
 from oxbow_assignment.partition import BALANCE, Partition, balanced_partition, wavefront_partition
 from oxbow_contour.service import handle as contour
+from real_lakes import MISSIONS, needs_missions
 
 quick = settings(deadline=None, max_examples=8, derandomize=True)
 
-LAKES = sorted((Path(__file__).parents[2] / "../shared/data/missions").glob("*.json"))
 TRIANGLES = 220
 """For each share, about."""
 
@@ -83,8 +82,8 @@ def test_shares_of_nasty_shapes_are_balanced(name, vehicles):
     assert partition.imbalance <= BALANCE
 
 
-@pytest.mark.skipif(not LAKES, reason="needs the shared missions")
-@pytest.mark.parametrize("path", LAKES, ids=lambda path: path.stem)
+@needs_missions
+@pytest.mark.parametrize("path", MISSIONS, ids=lambda path: path.stem)
 def test_shares_of_real_lakes_are_balanced(path):
     mission = read_mission(path)
     site = Site.of(mission)

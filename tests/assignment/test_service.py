@@ -1,7 +1,5 @@
 """The stage: shares that tile the water, sorties that keep to range and water, and nothing forgotten."""
 
-from pathlib import Path
-
 import msgspec
 import numpy as np
 import pytest
@@ -20,10 +18,10 @@ from oxbow.mission import read_mission
 from oxbow.recording import Layer, discard
 from oxbow.site import Site
 from oxbow.testing import nasty_polygons
-from oxbow_assignment import joint
 from oxbow_assignment.partition import BALANCE
 from oxbow_assignment.service import handle
 from oxbow_contour.service import handle as contour
+from real_lakes import MISSIONS, needs_missions
 
 quick = settings(deadline=None, max_examples=8, derandomize=True)
 replaced = msgspec.structs.replace
@@ -178,7 +176,6 @@ def test_what_of_a_hot_spot_lies_on_land_is_told():
     assert found.treated_share[0] >= 0.99
 
 
-@pytest.mark.skipif(not joint.is_available(), reason="needs the extra `fleet`")
 def test_the_gap_to_the_joint_optimiser_is_told():
     assert reply().joint_gap == pytest.approx(0.0, abs=0.3)
 
@@ -217,11 +214,8 @@ def require_shares(request: AssignRequest) -> None:
     assert deviation <= BALANCE
 
 
-LAKES = sorted((Path(__file__).parents[2] / "../shared/data/missions").glob("*.json"))
-
-
-@pytest.mark.skipif(not LAKES, reason="no real lakes beside the checkout")
-@pytest.mark.parametrize("path", LAKES[::4], ids=lambda path: path.stem)
+@needs_missions
+@pytest.mark.parametrize("path", MISSIONS[::4], ids=lambda path: path.stem)
 def test_real_lakes_are_shared_and_treated(path):
     mission = read_mission(path)
     site = Site.of(mission)

@@ -1,9 +1,7 @@
 """The certificate: exact cases, bounds that hold, adversarial paths, and agreement with an independent judge."""
 
-import importlib.util
 import json
 import math
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -25,6 +23,7 @@ from oxbow_certificate.cover import least_radius
 from oxbow_certificate.service import handle
 from oxbow_cli.evaluation import evaluate
 from oxbow_cli.local import local_call
+from real_lakes import mission_file, needs_referee, referee
 
 SQUARE = box(0, 0, 100, 100)
 quick = settings(deadline=None, max_examples=8, derandomize=True)
@@ -178,19 +177,12 @@ def test_every_step_is_shown():
     assert {layer.name for layer in layers} == {"path", "gaps", "worst_gap", "figures"}
 
 
-SHARED = Path(__file__).parents[2] / "../shared"
-
-
-@pytest.mark.skipif(not SHARED.exists(), reason="needs the shared missions and their judge")
-@pytest.mark.parametrize("name", ["lake-N72.1W106.5", "lake-S04.2E015.4"])
+@needs_referee
+@pytest.mark.parametrize("name", ["N72.1W106.5", "S04.2E015.4"])
 def test_agrees_with_the_independent_judge(name):
-    spec = importlib.util.spec_from_file_location("referee", SHARED / "referee/referee.py")
-    assert spec is not None
-    referee = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(referee)
     options = PlanOptions(time_limit_s=0.1)
-    mission = plan_mission(read_mission(SHARED / f"data/missions/{name}.json"), options, call=local_call())
-    judged = referee.judge(json.loads(mission_json(mission)))
+    mission = plan_mission(read_mission(mission_file(name)), options, call=local_call())
+    judged = referee().judge(json.loads(mission_json(mission)))
     assert mission.plan is not None
     for own in (mission.plan.certificate, evaluate(mission)):
         assert own.crossings == judged["crossings"] == 0

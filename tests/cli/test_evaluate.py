@@ -1,14 +1,12 @@
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from oxbow.mission import Mission, parse_mission
 from oxbow_cli.comparison import compare
-
-REFEREE = Path(__file__).parents[2] / "../shared/referee/referee.py"
+from real_lakes import REFEREE, needs_referee
 
 
 def mission(document) -> Mission:
@@ -105,9 +103,8 @@ def test_one_file_or_two_to_compare(oxbow, arguments):
     assert "--compare" in result.stderr
 
 
+@needs_referee
 def test_equals_the_referee_within_one_percent(oxbow, walked):
-    if not REFEREE.exists():
-        pytest.skip("no referee beside this checkout")
     found = json.loads(oxbow("evaluate", walked, "--json").stdout)
     judged = subprocess.run(
         [sys.executable, REFEREE, walked, "--json"], capture_output=True, text=True, check=True

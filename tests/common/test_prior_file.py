@@ -1,6 +1,5 @@
 """Prior models from files: GeoJSON, ASCII grids and GeoTIFFs; what they hold, and what is wrong with them."""
 
-import importlib.util
 import json
 import sys
 
@@ -161,7 +160,6 @@ def test_a_raster_of_many_single_cells_is_united():
     assert len(black.geometry.geoms) == len(white.geometry.geoms) == 5_000
 
 
-@pytest.mark.skipif(importlib.util.find_spec("rasterio") is None, reason="needs the extra `raster`")
 class TestGeoTiff:
     @pytest.fixture
     def tiff(self, tmp_path):

@@ -10,6 +10,7 @@ from oxbow.codec import decode, encode
 from oxbow.contracts import ContourRequest, FreeSpace
 from oxbow.recording import Layer, discard
 from oxbow_contour.service import handle
+from real_lakes import MISSIONS, needs_missions
 
 REQUEST = ContourRequest(
     outline=box(0, 0, 100, 100),
@@ -44,9 +45,6 @@ def test_the_reply_survives_the_bus():
     assert decode(encode(reply), FreeSpace) == reply
 
 
-MISSIONS = sorted((Path(__file__).parents[2] / "../shared/data/missions").glob("*.json"))
-
-
 def planar(positions: list[dict[str, float]], middle: np.ndarray) -> Polygon:
     """Metres by an equirectangular projection: near enough to test with."""
     degrees = np.array([(place["long"], place["lat"]) for place in positions])
@@ -66,7 +64,7 @@ def real_lake(mission: Path) -> ContourRequest:
     )
 
 
-@pytest.mark.skipif(not MISSIONS, reason="no real lakes beside the checkout")
+@needs_missions
 @pytest.mark.parametrize("mission", MISSIONS, ids=lambda mission: mission.stem)
 def test_real_lakes_lose_less_than_a_percent(mission):
     request = real_lake(mission)

@@ -1,7 +1,6 @@
 """Cells tile the water, and the Reeb graph tells its shape, for any polygon at any heading."""
 
 import math
-from pathlib import Path
 
 import msgspec
 import networkx as nx
@@ -20,6 +19,7 @@ from oxbow.testing import nasty_polygons
 from oxbow_decomposition.cells import decompose
 from oxbow_decomposition.headings import predicted_cost, scored_headings
 from oxbow_decomposition.service import handle
+from real_lakes import MISSIONS, needs_missions
 
 quick = settings(deadline=None, max_examples=40, derandomize=True)
 
@@ -153,10 +153,7 @@ def test_the_choice_is_recorded_and_shown():
     assert given_heading.heading_rad == 0.25
 
 
-MISSIONS = sorted((Path(__file__).parents[2] / "../shared/data/missions").glob("*.json"))
-
-
-@pytest.mark.skipif(not MISSIONS, reason="needs the shared missions")
+@needs_missions
 @pytest.mark.parametrize("path", MISSIONS, ids=lambda path: path.stem)
 def test_real_lakes_are_tiled(path):
     fields = msgspec.json.decode(path.read_bytes())

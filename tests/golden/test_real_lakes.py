@@ -1,6 +1,5 @@
 """Whole plans, judged: the project's own examples by its certificate, real lakes by an independent judge."""
 
-import importlib.util
 import json
 from pathlib import Path
 
@@ -11,9 +10,9 @@ from oxbow.mission import PlanOptions, mission_json, read_mission
 from oxbow.pipeline import plan_mission
 from oxbow_cli.evaluation import evaluate
 from oxbow_cli.local import local_call
+from real_lakes import mission_file, needs_referee, referee
 
 ROOT = Path(__file__).parents[2]
-SHARED = ROOT / "../shared"
 CASES = [
     ("N25.2E089.8", Method.SPACE_FILLING_CURVE, 2.2, 1.25),
     ("N43.9W070.5", Method.SPACE_FILLING_CURVE, 2.2, 1.25),
@@ -48,16 +47,11 @@ def test_the_example_treatment():
     assert all(spot.treated_share >= 0.99 or spot.hot_spot in proposed for spot in treatment.hot_spots)
 
 
-@pytest.mark.skipif(not SHARED.exists(), reason="needs the shared missions and their judge")
+@needs_referee
 @pytest.mark.parametrize(("name", "method", "worst_q", "worst_p95"), CASES)
 def test_real_lakes(name, method, worst_q, worst_p95):
-    mission = read_mission(SHARED / f"data/missions/lake-{name}.json")
-    spec = importlib.util.spec_from_file_location("referee", SHARED / "referee/referee.py")
-    assert spec is not None
-    referee = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(referee)
-    planned = plan_mission(mission, PlanOptions(method=method), call=local_call())
-    judged = referee.judge(json.loads(mission_json(planned)))
+    planned = plan_mission(read_mission(mission_file(name)), PlanOptions(method=method), call=local_call())
+    judged = referee().judge(json.loads(mission_json(planned)))
     assert judged["is_simple"] == 1
     assert judged["outside_m"] <= 0.01
     assert judged["unsafe_m"] <= 0.01
