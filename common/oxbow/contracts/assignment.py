@@ -1,0 +1,179 @@
+"""Stage `assignment`: who surveys and treats what."""
+
+from __future__ import annotations
+
+import enum
+import math
+
+from shapely import LineString, Polygon
+
+from oxbow.contracts.message import Message, Place, require_area, require_finite
+from oxbow.errors import InvalidMission
+
+__all__ = ["AssignRequest", "Assignment", "HotSpot", "LeftSpot", "Role", "Share", "Sortie", "Vehicle"]
+
+
+class Role(enum.StrEnum):
+    """What a vehicle is for: a master surveys, a slave treats (Rendas and Li 2016, section 1.1)."""
+
+    MASTER = "master"
+    SLAVE = "slave"
+
+
+class Vehicle(Message, frozen=True, kw_only=True):
+    """One vehicle of the fleet.
+
+    Parameters
+    ----------
+    name
+        What the mission calls it.
+    role
+        What it is for.
+    speed_mps
+        Its speed along a route.
+    length_m
+        The longest route that it may travel, from start to recovery: its range.
+    start, recovery
+        Where it is now and where it ends.
+
+    Raises
+    ------
+    InvalidMission
+        A vehicle without a name, a speed, a range or a place; the error names the vehicle.
+    """
+
+    name: str
+    role: Role = Role.SLAVE
+    speed_mps: float = 1.0
+    length_m: float
+    start: Place
+    recovery: Place
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            raise InvalidMission("is empty; expected a name for every vehicle", where="name")
+        for field, unit in (("speed_mps", "m/s"), ("length_m", "m")):
+            value = getattr(self, field)
+            if not (math.isfinite(value) and value > 0.0):
+                raise InvalidMission(
+                    f"is {value!r} {unit}; expected a finite number > 0", where=f"vehicle {self.name!r}: {field}"
+                )
+        for field in ("start", "recovery"):
+            if not all(map(math.isfinite, getattr(self, field))):
+                raise InvalidMission(
+                    f"is {getattr(self, field)!r}; expected two finite numbers",
+                    where=f"vehicle {self.name!r}: {field}",
+                )
+
+
+class HotSpot(Message, frozen=True, kw_only=True):
+    """Water to treat: a part of the site whose value is at or above the threshold."""
+
+    name: str
+    area: Polygon
+    value: float
+
+    def __post_init__(self) -> None:
+        require_area(self, "area")
+        require_finite(self, "value")
+
+
+class AssignRequest(Message, frozen=True, kw_only=True):
+    """Who does what: water to share among the masters, and hot spots to treat by the slaves.
+
+    Parameters
+    ----------
+    free
+        Where vehicles may go.
+    vehicles
+        The fleet.
+    share_free
+        Whether the free space is to be shared among the masters, in proportion to length times speed.
+    footprint_m
+        Edge of the triangles that shares are made of; chosen by the stage where it is absent.
+    hot_spots
+        What the slaves treat.
+    swath_m
+        The width that one pass over a hot spot treats.
+    seed
+        Where clustering starts.
+    """
+
+    free: Polygon
+    vehicles: tuple[Vehicle, ...]
+    share_free: bool = False
+    footprint_m: float | None = None
+    hot_spots: tuple[HotSpot, ...] = ()
+    swath_m: float | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        require_area(self, "free")
+        require_finite(self, "footprint_m", "swath_m", above=0.0)
+        if not self.vehicles:
+            raise InvalidMission("is empty; expected one vehicle or more", where="vehicles")
+        names = [vehicle.name for vehicle in self.vehicles]
+        if len(set(names)) < len(names):
+            twice = next(name for name in names if names.count(name) > 1)
+            raise InvalidMission(f"has {twice!r} twice; expected a name of its own for each", where="vehicles")
+        if self.hot_spots and self.swath_m is None:
+            raise InvalidMission("is missing; hot spots are treated in passes of that width", where="swath_m")
+
+
+class Share(Message, frozen=True, kw_only=True):
+    """The connected part of the free space that one master surveys."""
+
+    vehicle: str
+    area: Polygon
+
+
+class Sortie(Message, frozen=True, kw_only=True):
+    """One journey of a slave: from its start over hot spots, named in order, to its recovery."""
+
+    vehicle: str
+    path: LineString
+    hot_spots: tuple[str, ...]
+    length_m: float
+    duration_s: float
+
+
+class LeftSpot(Message, frozen=True, kw_only=True):
+    """A hot spot that no vehicle can treat within its range, and why; the best value for its way comes first."""
+
+    hot_spot: str
+    value_per_m: float
+    reason: str
+
+
+class Assignment(Message, frozen=True, kw_only=True):
+    """Who does what.
+
+    Parameters
+    ----------
+    shares
+        One a master, where the free space was to be shared. Together they are the free space.
+    imbalance
+        The largest deviation of a share's area from what its vehicle's capacity asks for, as a part of that.
+    sorties
+        The first journey of every slave that has one, within its range.
+    further
+        Journeys proposed for what these leave: from the start once more.
+    left
+        What no journey of its own could treat.
+    treated_share
+        Of each hot spot's area in the free space, how much the sorties' swaths cover, in order of the request.
+    makespan_s
+        Duration of the longest sortie.
+    joint_gap
+        How much longer the makespan is than a joint optimiser's, as a part of that; None without the optimiser.
+    """
+
+    shares: tuple[Share, ...] = ()
+    imbalance: float = 0.0
+    sorties: tuple[Sortie, ...] = ()
+    further: tuple[Sortie, ...] = ()
+    left: tuple[LeftSpot, ...] = ()
+    treated_share: tuple[float, ...] = ()
+    makespan_s: float = 0.0
+    joint_gap: float | None = None
+    warnings: tuple[str, ...] = ()

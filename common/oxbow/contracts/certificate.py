@@ -1,0 +1,139 @@
+"""Stage `certificate`: from paths to how good they are."""
+
+from __future__ import annotations
+
+import enum
+import math
+
+from shapely import LineString, Polygon
+
+from oxbow.contracts.message import Message, Place, require_area, require_finite
+from oxbow.errors import InvalidMission
+
+__all__ = ["Certificate", "CertifyRequest", "Conformance", "Measures", "Track", "Variogram", "VariogramModel"]
+
+
+class VariogramModel(enum.StrEnum):
+    """How the values of a field at two places differ, by their distance."""
+
+    EXPONENTIAL = "exponential"
+    SPHERICAL = "spherical"
+    GAUSSIAN = "gaussian"
+    MATERN32 = "matern32"
+
+
+class Variogram(Message, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A stationary and isotropic model of a field: half the mean squared difference of two places' values.
+
+    It rises from `nugget`, by which places right beside one another differ, to `sill`, by which places far apart
+    do (the nugget included); both are in the squared unit of the field. Within `range_m`, 95 % of that rise is
+    done, in the spherical model all of it. `matern32` is Matern's model of smoothness 3/2.
+    """
+
+    model: VariogramModel
+    range_m: float
+    sill: float
+    nugget: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_finite(self, "range_m", "sill", above=0.0)
+        require_finite(self, "nugget", least=0.0)
+        if self.nugget >= self.sill:
+            raise InvalidMission(f"is {self.nugget!r}; expected less than the sill, {self.sill!r}", where="nugget")
+
+
+class Track(Message, frozen=True, kw_only=True):
+    """One vehicle's path, where it should start and end, and how fast it is travelled."""
+
+    path: LineString
+    launch: Place
+    recovery: Place
+    speed_mps: float = 1.0
+
+    def __post_init__(self) -> None:
+        require_finite(self, "speed_mps", above=0.0)
+        if not (0 < self.path.length < math.inf):
+            raise InvalidMission(
+                f"is {self.path.length!r} m long; expected a path of finite length > 0", where="path"
+            )
+
+
+class CertifyRequest(Track, frozen=True, kw_only=True):
+    """A path to judge against the mission itself: the true outline and zones, not the planner's free space.
+
+    The paths of a team are judged together: `others` are those of its further vehicles. `areas` are what the paths
+    are to cover where that is not all of the free space: the hot spots of a treatment.
+    """
+
+    outline: Polygon
+    zones: tuple[Polygon, ...] = ()
+    safety_m: float = 0.0
+    variogram: Variogram | None = None
+    others: tuple[Track, ...] = ()
+    areas: tuple[Polygon, ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_area(self, "outline")
+        require_finite(self, "safety_m", least=0.0)
+
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """Every path."""
+        return (self, *self.others)
+
+
+class Conformance(Message, frozen=True, kw_only=True):
+    """What there is of a path, and whether it keeps the rules; defined in `docs/quality.md`."""
+
+    length_m: float
+    duration_s: float
+    waypoints: int
+    is_simple: bool
+    crossings: int
+    outside_m: float
+    unsafe_m: float
+
+
+class Measures(Conformance, frozen=True, kw_only=True):
+    """How good a path is against what is possible; the measures are defined in `docs/quality.md`.
+
+    Of several paths, `duration_s` is that of the longest, figures of the rules are sums, and coverage is that of
+    all of them together.
+
+    `cover_radius_m` are certified (low, high) bounds of the largest distance from a point of the free space to
+    the path (report, section 1.2.1, MinMax); `least_radius_m` is the least any path of that length could reach.
+    The kriging variances, shares of the sill, are there where a variogram is. `least_leg_distance_m` (MaxMin) is
+    None where no two legs are parallel, the discrepancy where the path keeps outside the free space; and all that
+    may be None is so in plans of earlier versions.
+    """
+
+    components: int
+    free_area_m2: float
+    judged_area: float
+    cover_radius_m: tuple[float, float]
+    least_radius_m: float
+    q: float
+    mean_distance_m: float
+    p95_distance_m: float
+    mean_ratio: float
+    p95_ratio: float
+    p99_distance_m: float | None = None
+    p99_ratio: float | None = None
+    least_leg_distance_m: float | None = None
+    discrepancy: float | None = None
+    discrepancy_ratio: float | None = None
+    directional_evenness: float | None = None
+    turns: int | None = None
+    kriging_variance_mean: float | None = None
+    kriging_variance_max: float | None = None
+
+
+class Certificate(Measures, frozen=True, kw_only=True):
+    """The measures of a path, and the place of the free space that is farthest from it.
+
+    `tracks` are the figures of each path, where there are several.
+    """
+
+    worst_gap: Place | None = None
+    tracks: tuple[Conformance, ...] = ()

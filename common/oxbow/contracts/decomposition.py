@@ -1,0 +1,83 @@
+"""Stage `decomposition`: from free space to cells."""
+
+from __future__ import annotations
+
+import enum
+
+import numpy as np
+from shapely import Polygon
+
+from oxbow.contracts.message import FloatArray, Message, Place, require_area, require_finite
+from oxbow.errors import InvalidMission
+
+__all__ = ["Cell", "CriticalKind", "CriticalPoint", "DecomposeRequest", "Decomposition", "HeadingScore"]
+
+
+class CriticalKind(enum.StrEnum):
+    """What happens to the sweep line's cells at a critical point."""
+
+    OPEN = "open"
+    CLOSE = "close"
+    SPLIT = "split"
+    MERGE = "merge"
+
+
+class CriticalPoint(Message, frozen=True, kw_only=True):
+    """A vertex at which the number of cells on the sweep line changes; `place` is planar."""
+
+    kind: CriticalKind
+    place: Place
+
+
+class Cell(Message, frozen=True, kw_only=True):
+    """A region between a floor and a ceiling, met by every transect line in one interval.
+
+    `floor` and `ceiling` are float arrays of shape (n, 2) in the *sweep frame* of the decomposition
+    (u across the transects, v along them), both with non-decreasing u, and with equal first and equal
+    last u. `start` and `end` are indices of the critical points at which the cell begins and ends.
+    """
+
+    floor: FloatArray
+    ceiling: FloatArray
+    start: int
+    end: int
+
+    def __post_init__(self) -> None:
+        for field in ("floor", "ceiling"):
+            chain = getattr(self, field)
+            if chain.ndim != 2 or chain.shape[1] != 2 or len(chain) < 1 or (np.diff(chain[:, 0]) < 0).any():
+                raise InvalidMission("is not an (n, 2) chain with non-decreasing u", where=field)
+
+
+class HeadingScore(Message, frozen=True, kw_only=True):
+    """The predicted cost of one heading: metres of path per square metre of water, less is better."""
+
+    heading_rad: float
+    predicted_cost: float
+
+
+class DecomposeRequest(Message, frozen=True, kw_only=True):
+    """Free space to cut into cells; the best of several headings where `heading_rad` is absent."""
+
+    free: Polygon
+    spacing_m: float
+    heading_rad: float | None = None
+
+    def __post_init__(self) -> None:
+        require_area(self, "free")
+        require_finite(self, "spacing_m", above=0.0)
+        require_finite(self, "heading_rad")
+
+
+class Decomposition(Message, frozen=True, kw_only=True):
+    """Cells that tile the free space, and the critical points between them: the Reeb graph.
+
+    Transects run along `heading_rad` (clockwise from north). Sweep frame and planar frame differ by a
+    rotation: u = x cos h - y sin h, v = x sin h + y cos h. The Reeb graph's nodes are the critical points,
+    its edges the cells (`start` -> `end`).
+    """
+
+    heading_rad: float
+    cells: tuple[Cell, ...]
+    critical_points: tuple[CriticalPoint, ...]
+    scores: tuple[HeadingScore, ...] = ()

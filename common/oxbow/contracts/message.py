@@ -1,0 +1,38 @@
+"""What every message between the processes is, and the checks that messages have in common."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from oxbow.errors import InvalidMission
+
+__all__ = ["FloatArray", "Message", "Place", "require_area", "require_finite"]
+
+FloatArray = npt.NDArray[np.float64]
+Place = tuple[float, float]
+"""A planar position (x east, y north) in metres."""
+
+
+class Message(msgspec.Struct, frozen=True, kw_only=True):
+    """Base of every message on the bus between Oxbow's own processes."""
+
+
+def require_finite(message: Message, *fields: str, least: float = -math.inf, above: float = -math.inf) -> None:
+    """Check numeric fields of a message: finite, at least `least`, strictly above `above`."""
+    for field in fields:
+        value = getattr(message, field)
+        if value is not None and not (math.isfinite(value) and value >= least and value > above):
+            accepted = f"> {above}" if above > -math.inf else f">= {least}" if least > -math.inf else "any"
+            raise InvalidMission(f"is {value!r}; expected a finite number, {accepted}", where=field)
+
+
+def require_area(message: Message, *fields: str) -> None:
+    """Check polygon fields of a message: valid, with an area."""
+    for field in fields:
+        polygon = getattr(message, field)
+        if polygon.is_empty or not polygon.is_valid:
+            raise InvalidMission("is empty or not a valid polygon", where=field)

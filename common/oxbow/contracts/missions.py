@@ -1,0 +1,55 @@
+"""What a DSS is told of its missions, in JSON."""
+
+from __future__ import annotations
+
+import enum
+
+from oxbow.contracts.message import Message
+from oxbow.errors import ErrorReply
+
+__all__ = ["DEFAULT_DEADLINE_S", "MissionState", "MissionStatus"]
+
+DEFAULT_DEADLINE_S = 120.0
+"""Seconds that planning one mission may take, its wait for a free planner not counted."""
+
+
+class MissionState(enum.StrEnum):
+    """How far a mission's revision has come; `DONE` and `FAILED` are final."""
+
+    ACCEPTED = "accepted"
+    PLANNING = "planning"
+    DONE = "done"
+    FAILED = "failed"
+
+    @property
+    def is_final(self) -> bool:
+        return self in (MissionState.DONE, MissionState.FAILED)
+
+
+class MissionStatus(Message, frozen=True, kw_only=True):
+    """Where a mission stands.
+
+    Parameters
+    ----------
+    mission_id, revision
+        Which request it is about: every new content under one id is a new revision, counted from 1. A request
+        whose id cannot be kept has revision 0.
+    state
+        Accepted requests are on disk: each of them ends `done` or `failed`, whatever crashes.
+    stage
+        The stage at work while `planning`.
+    fraction
+        The share of the stages that are done, 0 to 1.
+    error
+        Why it `failed`.
+    time_s
+        Unix time of this state.
+    """
+
+    mission_id: str
+    revision: int
+    state: MissionState
+    stage: str = ""
+    fraction: float = 0.0
+    error: ErrorReply | None = None
+    time_s: float

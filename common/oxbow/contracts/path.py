@@ -1,0 +1,83 @@
+"""Stage `path`: from cells to a path."""
+
+from __future__ import annotations
+
+import enum
+
+from shapely import LineString, Polygon
+
+from oxbow.contracts.contour import DroppedPart, FreeSpace
+from oxbow.contracts.decomposition import Decomposition
+from oxbow.contracts.message import Message, Place, require_area, require_finite
+
+__all__ = ["Draw", "Method", "PathPlan", "PathRequest", "SpacingStep", "WeightedArea"]
+
+
+class Method(enum.StrEnum):
+    """A way to generate a path; the names are the report's (Rendas and Li 2016, section 1.1)."""
+
+    SPACE_FILLING_CURVE = "SpaceFillingCurve"
+    TOUR = "Tour"
+    TRANSECT = "Transect"
+    WATERSHED = "Watershed"
+
+
+class Draw(enum.StrEnum):
+    """How the inputs of the space-filling curve's network are drawn (Rendas and Li 2016, section 1.2.1.4)."""
+
+    LOW_DISCREPANCY = "low-discrepancy"
+    CONVEX_COMBINATION = "convex-combination"
+
+
+class WeightedArea(Message, frozen=True, kw_only=True):
+    """Where sampling is `weight` times as important as elsewhere, where the weight is 1."""
+
+    area: Polygon
+    weight: float
+
+    def __post_init__(self) -> None:
+        require_area(self, "area")
+        require_finite(self, "weight", least=0.0)
+
+
+class PathRequest(Message, frozen=True, kw_only=True):
+    """What a path must keep to: the water, its cells, the longest length, the least spacing.
+
+    `weighted_areas` do not overlap, and may reach beyond the water. `time_limit_s` is what may be spent on
+    improving the path; without it the work is fixed, and the same request gives the same path everywhere.
+    `smooth` asks for rounded corners. `draw` matters to the space-filling curve alone.
+    """
+
+    method: Method = Method.SPACE_FILLING_CURVE
+    space: FreeSpace
+    decomposition: Decomposition
+    launch: Place
+    recovery: Place
+    length_m: float
+    min_spacing_m: float = 0.0
+    seed: int = 0
+    weighted_areas: tuple[WeightedArea, ...] = ()
+    time_limit_s: float | None = None
+    smooth: bool = False
+    draw: Draw = Draw.LOW_DISCREPANCY
+
+    def __post_init__(self) -> None:
+        require_finite(self, "length_m", "time_limit_s", above=0.0)
+        require_finite(self, "min_spacing_m", least=0.0)
+
+
+class SpacingStep(Message, frozen=True, kw_only=True):
+    """One turn of the spacing loop (report, steps 5 to 8): the spacing tried and the length it gave."""
+
+    spacing_m: float
+    length_m: float
+
+
+class PathPlan(Message, frozen=True, kw_only=True):
+    """A path from launch to recovery, simple and inside the free space (legs in the water)."""
+
+    path: LineString
+    spacing_m: float
+    steps: tuple[SpacingStep, ...]
+    dropped: tuple[DroppedPart, ...] = ()
+    warnings: tuple[str, ...] = ()

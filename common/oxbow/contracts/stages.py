@@ -1,0 +1,51 @@
+"""The endpoints at which stages exchange their messages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from oxbow.contracts.assignment import Assignment, AssignRequest
+from oxbow.contracts.certificate import Certificate, CertifyRequest
+from oxbow.contracts.contour import ContourRequest, FreeSpace
+from oxbow.contracts.decomposition import DecomposeRequest, Decomposition
+from oxbow.contracts.keys import PREFIX, checked_id, introspection_key, live_key
+from oxbow.contracts.message import Message
+from oxbow.contracts.path import PathPlan, PathRequest
+
+__all__ = ["ASSIGN", "CERTIFY", "CONTOUR", "DECOMPOSE", "MAX_REQUEST_BYTES", "PATH", "STAGES", "Endpoint"]
+
+Q = TypeVar("Q", bound=Message)
+R = TypeVar("R", bound=Message)
+
+MAX_REQUEST_BYTES = 128 * 2**20
+
+
+@dataclass(frozen=True)
+class Endpoint(Generic[Q, R]):
+    """One request/reply exchange that a stage serves."""
+
+    stage: str
+    request: type[Q]
+    reply: type[R]
+
+    def instance_key(self, instance: str) -> str:
+        """Where one replica of the stage takes queries."""
+        return f"{PREFIX}/stage/{self.stage}/{checked_id(instance)}"
+
+    def introspection_key(self, instance: str, what: str) -> str:
+        """Where one replica tells about itself; `what` is one of `INTROSPECTION`."""
+        return introspection_key(self.stage, instance, what)
+
+    def live_key(self, instance: str) -> str:
+        """The liveliness token of one replica."""
+        return live_key(self.stage, instance)
+
+
+CONTOUR: Endpoint[ContourRequest, FreeSpace] = Endpoint("contour", ContourRequest, FreeSpace)
+DECOMPOSE: Endpoint[DecomposeRequest, Decomposition] = Endpoint("decomposition", DecomposeRequest, Decomposition)
+PATH: Endpoint[PathRequest, PathPlan] = Endpoint("path", PathRequest, PathPlan)
+ASSIGN: Endpoint[AssignRequest, Assignment] = Endpoint("assignment", AssignRequest, Assignment)
+CERTIFY: Endpoint[CertifyRequest, Certificate] = Endpoint("certificate", CertifyRequest, Certificate)
+
+STAGES: tuple[Endpoint[Any, Any], ...] = (CONTOUR, ASSIGN, DECOMPOSE, PATH, CERTIFY)
