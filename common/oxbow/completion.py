@@ -59,7 +59,9 @@ def completed(
         tolerance_m=space.tolerance_m,
         compression=space.compression,
         certificate=_in_degrees(teams[0].certificate, site.frame),
-        warnings=site.warnings + space.warnings + tuple(text for team in teams for text in team.warnings),
+        warnings=site.warnings
+        + space.warnings
+        + tuple(text for team in teams for text in team.warnings + _near_legs(mission, team)),
         dropped=tuple(
             _dropped(part, site.frame) for part in space.dropped + tuple(p for team in teams for p in team.dropped)
         ),
@@ -132,6 +134,17 @@ def _fleet(teams: Sequence[TeamPlan], written: Sequence[Sequence[_Written]]) -> 
         makespan_s=max(vehicle.duration_s for vehicle in vehicles),
         imbalance=max(team.assignment.imbalance if team.assignment else 0.0 for team in teams),
         vehicles=tuple(vehicles),
+    )
+
+
+def _near_legs(mission: Mission, team: TeamPlan) -> tuple[str, ...]:
+    """Whether the legs of a survey come nearer to one another than the mission wants: water comes before rate."""
+    wanted_m, least_m = mission.minimal_spatial_rate_m, team.certificate.least_leg_distance_m
+    if wanted_m is None or least_m is None or least_m >= wanted_m or any(plan.hot_spots for plan in team.vehicles):
+        return ()
+    return (
+        f"legs come as near as {least_m:.3g} m to one another, in narrow water or beside a bend;"
+        f" Minimal_spatial_rate is {wanted_m:g} m, which the spacing of legs keeps, and single legs may not",
     )
 
 

@@ -108,6 +108,14 @@ def test_one_master_surveys(kind):
     assert completed.plan.certificate.judged_area == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(("rate_m", "is_told"), [(60.0, True), (0.01, False)])
+def test_legs_nearer_than_the_least_rate_are_told(rate_m, is_told):
+    plan = planned(mission("map", prior=None, Minimal_spatial_rate=rate_m))[0].plan
+    assert plan.spacing_m >= rate_m
+    assert (plan.certificate.least_leg_distance_m < rate_m) is is_told
+    assert any(text.startswith("legs come as near as") for text in plan.warnings) is is_told
+
+
 @pytest.mark.parametrize("count", [2, 3])
 def test_masters_share_the_water_and_keep_to_their_shares(count):
     completed, calls = planned(mission("map", boats("master", count)))
