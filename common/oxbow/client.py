@@ -14,12 +14,12 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Self, TypedDict, TypeVar, Unpack
+from typing import TypedDict, TypeVar, Unpack
 
 import msgspec
 
 from oxbow.bus import DEFAULT_ENDPOINT, Bus
+from oxbow.closing import Closing
 from oxbow.contracts import (
     ANY,
     DEFAULT_DEADLINE_S,
@@ -65,7 +65,7 @@ class PlanUpdate:
     mission: Mission
 
 
-class PlanUpdates(Iterator[PlanUpdate]):
+class PlanUpdates(Closing, Iterator[PlanUpdate]):
     """Plans as they are made, each once, those of one mission by rising revision; blocks while there is none.
 
     Iteration ends when it is closed, by whichever thread, or after `timeout_s` without an update.
@@ -96,14 +96,6 @@ class PlanUpdates(Iterator[PlanUpdate]):
             raise StopIteration
         return _plan_update(payload)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     def close(self) -> None:
         """Receive nothing more, and end the iteration."""
         self._kept = iter(())
@@ -111,7 +103,7 @@ class PlanUpdates(Iterator[PlanUpdate]):
         self._live.put(None)
 
 
-class Client:
+class Client(Closing):
     """Hands missions to Oxbow and receives plans; a context manager, safe to share between threads.
 
     Parameters
@@ -133,14 +125,6 @@ class Client:
             self._bus = stack.enter_context(Bus.connect(endpoint, timeout_s=timeout_s))
             self._bus.wait_ready(["mission"], max(0.0, give_up - time.monotonic()))
             self._stack = stack.pop_all()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Leave the bus."""

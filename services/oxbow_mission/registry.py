@@ -5,13 +5,13 @@ from __future__ import annotations
 import hashlib
 import threading
 import time
-from types import TracebackType
 from typing import Self
 from urllib.parse import quote
 
 import msgspec
 
 from oxbow.bus import Session
+from oxbow.closing import Closing
 from oxbow.contracts import MissionKey, MissionState, MissionStatus, checked_id, mission_key
 from oxbow.errors import ErrorReply, InvalidMission, OxbowError, Unavailable
 from oxbow.submission import Submission
@@ -20,7 +20,7 @@ from oxbow_mission.store import Job, Request, Revision, Store
 __all__ = ["Registry"]
 
 
-class Registry:
+class Registry(Closing):
     """The missions, for the threads that take them in, plan them and wait for them.
 
     One lock orders all changes, so statuses are published in the order in which they came about.
@@ -44,11 +44,6 @@ class Registry:
         for status in self.store.unannounced():
             self._announce(status)
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Change nothing any more: what is being planned waits in the store for another time."""

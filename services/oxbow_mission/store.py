@@ -15,11 +15,10 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import msgspec
 
+from oxbow.closing import Closing
 from oxbow.contracts import MissionState, MissionStatus
 from oxbow.errors import ErrorCode, ErrorReply, Internal, OxbowError, Unavailable
 
@@ -99,7 +98,7 @@ class Job:
     request: Request
 
 
-class Store:
+class Store(Closing):
     """Missions and their revisions; safe to share between threads, not between processes.
 
     Parameters
@@ -154,14 +153,6 @@ class Store:
             self._db.executescript(_SCHEMA)
         elif version != SCHEMA_VERSION:
             raise Unavailable(f"has schema {version}; this version reads {SCHEMA_VERSION}", where=str(self.path))
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Let another process have the folder."""

@@ -11,7 +11,6 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from types import TracebackType
 from typing import Self
 
 import msgspec
@@ -22,6 +21,7 @@ from oxbow.bus.config import DEFAULT_ENDPOINT, client_config
 from oxbow.bus.mailbox import Mailbox
 from oxbow.bus.query import JSON, Query
 from oxbow.bus.subscription import Audience, Declared, OnQuery, OnSample, Subscription
+from oxbow.closing import Closing
 from oxbow.errors import Busy, DeadlineExceeded, ErrorReply, Internal, OxbowError, Unavailable
 
 __all__ = ["Session", "error_of"]
@@ -33,7 +33,7 @@ LINK_LOSS_S = 0.1
 _log = logging.getLogger(__name__)
 
 
-class Session:
+class Session(Closing):
     """A client of the router; a context manager that leaves the bus on exit. Safe to share between threads.
 
     Callbacks run on zenoh's network thread and only put into a bounded queue, since one that takes its time
@@ -84,14 +84,6 @@ class Session:
             except Unavailable as error:
                 _log.warning("%s; waiting for it", error)
         return None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Leave the bus: no longer alive, then nothing more received, then what was received is dealt with."""
