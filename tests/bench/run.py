@@ -43,7 +43,7 @@ def main() -> None:
     names = parser.parse_args().sections or list(SECTIONS)
     if unknown := set(names) - set(SECTIONS):
         parser.error(f"no section {', '.join(sorted(unknown))}; expected some of {', '.join(SECTIONS)}")
-    console = Console(width=None if Console().is_terminal else 140)
+    console = Console(width=None if Console().is_terminal else 170)
     for name in names:
         started = time.monotonic()
         tables = []
