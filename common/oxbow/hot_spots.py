@@ -16,10 +16,10 @@ from oxbow.frame import Frame
 from oxbow.prior import PriorFeature
 from oxbow.weights import planar
 
-__all__ = ["HotSpots", "hot_spots"]
+__all__ = ["HotSpots", "Overlap", "first_overlap", "hot_spots"]
 
-OVERLAP = 1e-3
-"""Hot spots overlap where they share more than this part of the smaller one: less is rounding."""
+ROUNDING = 1e-3
+"""Less of a hot spot than this share is rounding: of what it shares with another, and of what of it is water."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,15 @@ class HotSpots:
 
     spots: tuple[HotSpot, ...] = ()
     warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """Two hot spots that overlap, the earlier one first, and the area that both have in common."""
+
+    one: HotSpot
+    other: HotSpot
+    area_m2: float
 
 
 def hot_spots(
@@ -54,7 +63,8 @@ def hot_spots(
     Raises
     ------
     InvalidMission
-        A hot spot lies within the outline but not in the water, or two overlap; the error names the feature.
+        A hot spot within the outline has a value that is not above 0 or does not lie in the water, or two overlap;
+        the error names the feature.
     """
     spots: list[HotSpot] = []
     warnings: list[str] = []
@@ -65,20 +75,51 @@ def hot_spots(
         if not outline.intersects(geometry):
             warnings.append(f"{where} lies outside the water: it is not treated")
             continue
-        _require_water(geometry, water, where)
-        spots += _spots(geometry, f"features[{index}]", float(feature.value or 0.0), swath_m)
-    in_water = [spot for spot in spots if spot.area.intersects(water)]
-    _require_apart(in_water)
-    return HotSpots(tuple(in_water), tuple(warnings))
-
-
-def _require_water(geometry: BaseGeometry, water: BaseGeometry, where: str) -> None:
-    wet = geometry.intersection(water)
-    if wet.is_empty or wet.area < OVERLAP * geometry.area:
-        place = geometry.representative_point()
+        _require_water(geometry, water, frame, where)
+        for spot in _spots(geometry, f"features[{index}]", _worth(feature, where), swath_m):
+            if spot.area.intersects(water):
+                spots.append(spot)
+            else:
+                warnings.append(f"PriorModel.{spot.name} lies outside the water: it is not treated")
+    if overlap := first_overlap(spots):
         raise InvalidMission(
-            f"is a hot spot on land or in a forbidden zone, at ({place.x:.0f}, {place.y:.0f}) m from the middle of"
-            " the site; expected one in the water",
+            f"overlaps {overlap.one.name} by {overlap.area_m2:.0f} m2; expected hot spots apart from one another,"
+            " and none inside another",
+            where=f"PriorModel.{overlap.other.name}",
+        )
+    return HotSpots(tuple(spots), tuple(warnings))
+
+
+def first_overlap(spots: Sequence[HotSpot]) -> Overlap | None:
+    """Two of several hot spots that overlap by more than rounding; None where all are apart."""
+    areas = np.array([spot.area for spot in spots], dtype=object)
+    one, other = STRtree(areas).query(areas, predicate="intersects")
+    one, other = one[one < other], other[one < other]
+    shared_m2 = shapely.area(shapely.intersection(areas[one], areas[other]))
+    smaller_m2 = np.minimum(shapely.area(areas[one]), shapely.area(areas[other]))
+    for pair in np.flatnonzero(shared_m2 > ROUNDING * smaller_m2)[:1].tolist():
+        return Overlap(spots[one[pair]], spots[other[pair]], float(shared_m2[pair]))
+    return None
+
+
+def _worth(feature: PriorFeature, where: str) -> float:
+    """The value of a feature that is to be treated."""
+    if feature.value is None or feature.value <= 0.0:
+        raise InvalidMission(
+            f"is {feature.value!r}; expected > 0: where not all hot spots can be treated, those of most value per"
+            " metre of way come first",
+            where=f"{where}.properties.value",
+        )
+    return feature.value
+
+
+def _require_water(geometry: BaseGeometry, water: BaseGeometry, frame: Frame, where: str) -> None:
+    wet = geometry.intersection(water)
+    if wet.is_empty or wet.area < ROUNDING * geometry.area:
+        long, lat = frame.to_degrees(shapely.get_coordinates(geometry.representative_point()))[0]
+        raise InvalidMission(
+            f"is a hot spot on land or in a forbidden zone, at lat {lat:.6f}, long {long:.6f}; expected one in the"
+            " water",
             where=where,
         )
 
@@ -89,19 +130,3 @@ def _spots(geometry: BaseGeometry, name: str, value: float, swath_m: float) -> I
     for number, area in enumerate(parts):
         own_name = name if len(parts) == 1 else f"{name}[{number}]"
         yield HotSpot(name=own_name, area=area, value=value)
-
-
-def _require_apart(spots: Sequence[HotSpot]) -> None:
-    areas = np.array([spot.area for spot in spots], dtype=object)
-    one, other = STRtree(areas).query(areas, predicate="intersects")
-    one, other = one[one < other], other[one < other]
-    shared_m2 = shapely.area(shapely.intersection(areas[one], areas[other]))
-    smaller_m2 = np.minimum(shapely.area(areas[one]), shapely.area(areas[other]))
-    overlapping = np.flatnonzero(shared_m2 > OVERLAP * smaller_m2)
-    if len(overlapping):
-        first = overlapping[0]
-        raise InvalidMission(
-            f"overlaps {spots[int(one[first])].name} by {shared_m2[first]:.0f} m2; expected hot spots apart from"
-            " one another, and none inside another",
-            where=f"PriorModel.{spots[int(other[first])].name}",
-        )

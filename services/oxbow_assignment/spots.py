@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
-import numpy as np
 import shapely
-from shapely import MultiPolygon, Polygon, STRtree
+from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import HotSpot
 from oxbow.errors import InvalidMission
+from oxbow.hot_spots import first_overlap
 
-__all__ = ["OVERLAP", "require_treatable", "waters"]
-
-OVERLAP = 1e-3
-"""Share of the smaller of two hot spots that both may have in common: contours are rounded."""
+__all__ = ["require_treatable", "waters"]
 
 LEAST = 1e-6
 """A smaller share of a hot spot in the free space is nothing."""
@@ -29,10 +27,9 @@ def require_treatable(spots: Sequence[HotSpot]) -> None:
     InvalidMission
         Names the hot spots, and the value, or the area that both have in common.
     """
-    names = [spot.name for spot in spots]
-    for name in names:
-        if names.count(name) > 1:
-            raise InvalidMission(f"has {name!r} {names.count(name)} times; expected once", where="hot_spots")
+    for name, count in Counter(spot.name for spot in spots).items():
+        if count > 1:
+            raise InvalidMission(f"has {name!r} {count} times; expected once", where="hot_spots")
     for spot in spots:
         if spot.value <= 0.0:
             raise InvalidMission(
@@ -40,14 +37,9 @@ def require_treatable(spots: Sequence[HotSpot]) -> None:
                 " per metre comes first",
                 where="value",
             )
-    areas = np.array([spot.area for spot in spots], dtype=object)
-    one, other = STRtree(areas).query(areas, predicate="intersects")
-    one, other = one[one < other], other[one < other]
-    common = shapely.area(shapely.intersection(areas[one], areas[other]))
-    smaller = np.minimum(shapely.area(areas[one]), shapely.area(areas[other]))
-    for index in np.flatnonzero(common > OVERLAP * smaller)[:1]:
+    if overlap := first_overlap(spots):
         raise InvalidMission(
-            f"hot spots {names[one[index]]!r} and {names[other[index]]!r} overlap in {common[index]:.4g} m2;"
+            f"hot spots {overlap.one.name!r} and {overlap.other.name!r} overlap in {overlap.area_m2:.4g} m2;"
             " expected areas apart",
             where="hot_spots",
         )

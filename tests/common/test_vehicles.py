@@ -166,13 +166,25 @@ def test_the_minimal_spatial_rate_stands_in_for_the_swath():
         ([spot(1.01, 46.01), spot(1.014, 46.01), spot(1.011, 46.011)], "PriorModel.features[2]", "features[0]"),
         ([spot(1.01, 46.01, 0.006), spot(1.011, 46.011, 0.001)], "PriorModel.features[1]", "features[0]"),
         ([spot(1.01, 46.01, value=3.0)], "PriorModel", "no hot spot"),
+        ([spot(1.01, 46.01), spot(1.015, 46.01, value=0.0)], "PriorModel.features[1].properties.value", "is 0.0"),
+        ([spot(1.01, 46.01, value=-2.0)], "PriorModel.features[0].properties.value", "is -2.0; expected > 0"),
         ([spot(1.10, 46.01)], "PriorModel", "no hot spot"),
     ],
-    ids=["island", "point on an island", "overlap", "nested", "below the threshold", "elsewhere"],
+    ids=[
+        "island",
+        "point on an island",
+        "overlap",
+        "nested",
+        "below the threshold",
+        "zero",
+        "negative",
+        "elsewhere",
+    ],
 )
 def test_hot_spots_that_cannot_be_treated_are_named(features, where, says):
+    threshold = -5.0 if where.endswith("value") else 30.0
     with pytest.raises(InvalidMission) as caught:
-        site(PriorModel=prior(*features), ForbiddenZones=[ISLAND])
+        site(PriorModel=prior(*features), ForbiddenZones=[ISLAND], Bloom={"Sensor": "chl", "Value": threshold})
     assert caught.value.where == where
     assert says in str(caught.value)
 
@@ -186,6 +198,17 @@ def test_a_hot_spot_elsewhere_is_a_warning():
     found = site(PriorModel=prior(spot(1.01, 46.01), spot(2.0, 46.01)))
     assert len(found.hot_spots) == 1
     assert any("features[1] lies outside the water" in warning for warning in found.warnings)
+
+
+def test_a_part_of_a_hot_spot_that_lies_elsewhere_is_a_warning():
+    found = site(PriorModel=prior(points([1.01, 46.01], [1.0205, 46.01])))
+    assert [each.name for each in found.hot_spots] == ["features[0][0]"]
+    assert any("features[0][1] lies outside the water" in warning for warning in found.warnings)
+
+
+def test_a_hot_spot_on_land_is_told_in_degrees():
+    with pytest.raises(InvalidMission, match=r"at lat 46\.00\d+, long 1\.00\d+"):
+        site(PriorModel=prior(spot(1.005, 46.005, 0.001)), ForbiddenZones=[ISLAND])
 
 
 def test_paths_are_read_and_written():
