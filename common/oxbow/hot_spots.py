@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 from shapely import Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
@@ -76,7 +77,9 @@ def hot_spots(
             warnings.append(f"{where} lies outside the water: it is not treated")
             continue
         _require_water(geometry, water, frame, where)
-        for spot in _spots(geometry, f"features[{index}]", _worth(feature, where), swath_m):
+        given = shapely.transform(shapely.get_parts(feature.geometry), frame.to_planar)
+        areas = _in_order(_areas(geometry, swath_m), given)
+        for spot in _spots(areas, f"features[{index}]", _worth(feature, where)):
             if spot.area.intersects(water):
                 spots.append(spot)
             else:
@@ -124,9 +127,18 @@ def _require_water(geometry: BaseGeometry, water: BaseGeometry, frame: Frame, wh
         )
 
 
-def _spots(geometry: BaseGeometry, name: str, value: float, swath_m: float) -> Iterator[HotSpot]:
+def _areas(geometry: BaseGeometry, swath_m: float) -> list[Polygon]:
+    """The polygons of a feature, or the discs about its points."""
     areas = geometry if geometry.area > 0 else geometry.buffer(swath_m)
-    parts = [part for part in shapely.get_parts(areas) if part.area > 0]
-    for number, area in enumerate(parts):
-        own_name = name if len(parts) == 1 else f"{name}[{number}]"
+    return [part for part in shapely.get_parts(areas) if part.area > 0]
+
+
+def _in_order(areas: list[Polygon], given: npt.NDArray[np.object_]) -> list[Polygon]:
+    """Areas in the order of the geometries that they are made of, which clipping and uniting them may change."""
+    return sorted(areas, key=lambda area: int(np.nanargmin(shapely.distance(given, area))))
+
+
+def _spots(areas: Sequence[Polygon], name: str, value: float) -> Iterator[HotSpot]:
+    for number, area in enumerate(areas):
+        own_name = name if len(areas) == 1 else f"{name}[{number}]"
         yield HotSpot(name=own_name, area=area, value=value)

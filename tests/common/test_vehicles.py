@@ -206,6 +206,19 @@ def test_a_part_of_a_hot_spot_that_lies_elsewhere_is_a_warning():
     assert any("features[0][1] lies outside the water" in warning for warning in found.warnings)
 
 
+@pytest.mark.parametrize("longs", [(1.004, 1.010, 1.016), (1.016, 1.004, 1.010)], ids=["eastwards", "mixed"])
+def test_the_hot_spots_of_a_feature_are_numbered_as_they_are_given(longs):
+    squares = [spot(long, 46.012)["geometry"]["coordinates"] for long in longs]
+    many = {"type": "MultiPolygon", "coordinates": squares}
+    polygons = {"type": "Feature", "geometry": many, "properties": {"value": 40.0}}
+    found = site(PriorModel=prior(points(*([long, 46.005] for long in longs)), polygons)).hot_spots
+    assert [each.name for each in found] == [f"features[{i}][{k}]" for i in range(2) for k in range(3)]
+    middles = [each.area.centroid.x for each in found]
+    ranks = sorted(range(3), key=longs.__getitem__)
+    assert sorted(range(3), key=middles[:3].__getitem__) == ranks
+    assert sorted(range(3), key=middles[3:].__getitem__) == ranks
+
+
 def test_a_hot_spot_on_land_is_told_in_degrees():
     with pytest.raises(InvalidMission, match=r"at lat 46\.00\d+, long 1\.00\d+"):
         site(PriorModel=prior(spot(1.005, 46.005, 0.001)), ForbiddenZones=[ISLAND])
