@@ -98,7 +98,7 @@ def plan(
     draw: Annotated[
         str, typer.Option(help="How SpaceFillingCurve draws its inputs: low-discrepancy or convex-combination.")
     ] = "low-discrepancy",
-    timeout: Annotated[float, typer.Option(metavar="S", min=0.001, help="Give up after so many seconds.")] = 120.0,
+    timeout: Annotated[float, typer.Option(metavar="S", min=0.001, help="Give up after so many seconds.")] = 300.0,
     home: Home = None,
     json: AsJson = False,
 ) -> None:

@@ -9,8 +9,8 @@ from oxbow.errors import ErrorReply
 
 __all__ = ["DEFAULT_DEADLINE_S", "MissionState", "MissionStatus"]
 
-DEFAULT_DEADLINE_S = 120.0
-"""Seconds that planning one mission may take, its wait for a free planner not counted."""
+DEFAULT_DEADLINE_S = 300.0
+"""Seconds that planning one mission may take, its wait for a free planner not counted: twenty vehicles' worth."""
 
 
 class MissionState(enum.StrEnum):
