@@ -162,5 +162,6 @@ def _member(
         length_m=given.length_m or (mission.master_length_m if is_master else mission.slave_length_m),
         start=locate(names[0], start),
         recovery=locate(names[1], recovery),
+        danger_factor=given.danger_factor or 1.0,
     )
     return Member(vehicle, start, recovery, fields)

@@ -15,6 +15,7 @@ import msgspec
 import numpy as np
 
 from oxbow.contracts import MAX_REQUEST_BYTES, Role, Variogram
+from oxbow.danger_zones import GivenDangerZone, danger_zone_document, gathered_danger_zones, require_dangers
 from oxbow.errors import InvalidMission
 from oxbow.files import read_bytes, write_atomically
 from oxbow.frame import Position, lonlat
@@ -78,6 +79,8 @@ _JSON_NAMES = {
     "recovery": "RecoveryPoint",
     "outline": "BoundingBox",
     "forbidden_zones": "ForbiddenZones",
+    "danger_zones": "DangerZones",
+    "danger_detour_m": "Danger_detour",
     "bloom": "Bloom",
     "master_speed_mps": "Master_speed",
     "slave_speed_mps": "Slave_speed",
@@ -122,6 +125,10 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
         Where the vehicle comes back; the launch point where absent.
     outline
         The water's contour, at least three distinct points, either orientation, closed or not.
+    danger_zones
+        What may be entered, at a risk.
+    danger_detour_m
+        The detour that a chance of no harm e times as good is worth; absent: `DANGER_DETOUR_M`.
     outline_name
         The name under which the outline came, and is written.
     safety_m
@@ -146,6 +153,8 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
     recovery: Position | None = None
     outline: tuple[Position, ...]
     forbidden_zones: tuple[tuple[Position, ...], ...] = ()
+    danger_zones: tuple[GivenDangerZone, ...] | None = None
+    danger_detour_m: float | None = None
     bloom: Bloom | None = None
     master_speed_mps: float = 1.0
     slave_speed_mps: float = 0.5
@@ -168,8 +177,10 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
             value = getattr(self, field)
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise InvalidMission(f"is {value!r}; expected a finite number > 0", where=_JSON_NAMES[field])
-        if not (math.isfinite(self.safety_m) and self.safety_m >= 0):
-            raise InvalidMission(f"is {self.safety_m!r}; expected a finite number >= 0", where="Safety")
+        for field in ("safety_m", "danger_detour_m"):
+            value = getattr(self, field)
+            if value is not None and not (math.isfinite(value) and value >= 0):
+                raise InvalidMission(f"is {value!r}; expected a finite number >= 0", where=_JSON_NAMES[field])
         if self.bloom is None and self.mission_type in NEEDS_BLOOM:
             raise InvalidMission(
                 f"is missing; a mission of type {self.mission_type} needs its Sensor and Value", where="Bloom"
@@ -178,6 +189,7 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
             raise InvalidMission(f"is {self.bloom.value!r}; expected a finite number", where="Bloom.Value")
         if clash := FIELD_NAMES & self.extra.keys():
             raise InvalidMission("is a field of the Mission File, not an extra one", where=min(clash))
+        require_dangers(self.danger_zones or ())
         self._check_vehicles()
         self._check_positions()
 
@@ -229,6 +241,8 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
         _require_degrees(self.outline_name, self.outline)
         for index, zone in enumerate(self.forbidden_zones):
             _require_degrees(f"ForbiddenZones[{index}]", zone)
+        for index, danger_zone in enumerate(self.danger_zones or ()):
+            _require_degrees(f"DangerZones[{index}].Contour", danger_zone.contour)
         _require_degrees("Master_Path", self.master_path or ())
         _require_degrees("Slave_Path", self.slave_path or ())
         for index, vehicle in enumerate(self.vehicles or ()):
@@ -279,6 +293,8 @@ def parse_mission(data: bytes) -> Mission:
         document["Bloom"] = msgspec.Raw(msgspec.json.encode(bloom))
     if "Vehicles" in document and bytes(document["Vehicles"]).startswith(b"["):
         document["Vehicles"] = gathered_vehicles(bytes(document["Vehicles"]))
+    if "DangerZones" in document and bytes(document["DangerZones"]).startswith(b"["):
+        document["DangerZones"] = gathered_danger_zones(bytes(document["DangerZones"]))
     if names:
         document["BoundingBox"] = document.pop(names[0])
         document["outline_name"] = msgspec.Raw(msgspec.json.encode(names[0]))
@@ -304,6 +320,8 @@ def mission_json(mission: Mission) -> bytes:
         given["Bloom"] = {"Sensor": bloom.sensor, "Value": bloom.value} | bloom.extra
     if mission.vehicles is not None:
         given["Vehicles"] = [vehicle_document(vehicle) for vehicle in mission.vehicles]
+    if mission.danger_zones is not None:
+        given["DangerZones"] = [danger_zone_document(zone) for zone in mission.danger_zones]
     document = given | {mission.outline_name.value: outline} | mission.extra | outputs
     present = {name: value for name, value in document.items() if value is not None or name in mission.extra}
     return msgspec.json.format(msgspec.json.encode(present), indent=2) + b"\n"

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from shapely import LineString, Point, Polygon
+from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.contracts import FloatArray, HotSpot, Place, Role, WeightedArea
+from oxbow.contours import Contour, Zone, danger_zones, forbidden_zones
+from oxbow.contracts import DANGER_DETOUR_M, DangerZone, FloatArray, HotSpot, Place, Role, WeightedArea
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.fleet import Member, members
 from oxbow.frame import Frame, Position, lonlat
@@ -23,8 +24,6 @@ __all__ = ["Site"]
 
 MAX_RADIUS_M = 300_000.0
 """How far a site may reach from the mean of its contour's points, and a launch point may lie from the water."""
-LEAST_WIDTH_M = 1e-3
-"""Points that lie in a strip narrower than this lie on one line."""
 ON_SHORE_M = 1.0
 """A vehicle's start no farther than this from the water is on its shore."""
 
@@ -53,6 +52,10 @@ class Site:
         Where sampling is more or less important than elsewhere.
     hot_spots
         What is to be treated.
+    danger_zones
+        The danger zones that meet the outline, one a polygon.
+    danger_detour_m
+        The detour that a chance of no harm e times as good is worth.
     warnings
         What the mission's author should know.
     """
@@ -67,6 +70,8 @@ class Site:
     nominal_spacing_m: float
     weighted_areas: tuple[WeightedArea, ...] = ()
     hot_spots: tuple[HotSpot, ...] = ()
+    danger_zones: tuple[DangerZone, ...] = ()
+    danger_detour_m: float = DANGER_DETOUR_M
     warnings: tuple[str, ...] = ()
 
     def team(self, role: Role) -> tuple[Member, ...]:
@@ -87,15 +92,18 @@ class Site:
         Infeasible
             The forbidden zones cover all of the water.
         """
-        contour = _Contour.of(mission.outline_name, mission.outline)
+        contour = Contour.of(mission.outline_name, mission.outline)
         frame = Frame.around(contour.degrees)
         outline = _outline(contour, frame)
-        zones, warnings = _zones(mission, frame, outline)
+        shapely.prepare(outline)
+        forbidden = forbidden_zones(mission, frame, outline)
+        zones = tuple(part for zone in forbidden for part in zone.parts)
         water = outline.difference(shapely.union_all(zones)) if zones else outline
         if water.area == 0.0:
             raise Infeasible("cover all of the water; nothing is left to plan on", where="ForbiddenZones")
         areas = () if mission.prior_model is None else weighted_areas(mission.prior_model, frame, outline)
         spots = _hot_spots(mission, frame, outline, water)
+        dangers = danger_zones(mission, frame, outline)
 
         def locate(name: str, position: Position) -> Place:
             place = _place(name, position, frame, outline)
@@ -115,47 +123,16 @@ class Site:
             nominal_spacing_m=_nominal_spacing_m(mission, fleet, water.area),
             weighted_areas=areas,
             hot_spots=spots.spots,
-            warnings=warnings + _prior_warnings(mission, areas) + spots.warnings + _idle_warnings(mission),
+            danger_zones=_dangerous(mission, dangers),
+            danger_detour_m=DANGER_DETOUR_M if mission.danger_detour_m is None else mission.danger_detour_m,
+            warnings=tuple(text for zone in (*forbidden, *dangers) for text in zone.warnings)
+            + _prior_warnings(mission, areas)
+            + spots.warnings
+            + _idle_warnings(mission),
         )
 
 
-@dataclass(frozen=True)
-class _Contour:
-    """A contour without its repeated points: `indices` tell where in the Mission File each point stands."""
-
-    name: str
-    degrees: FloatArray
-    indices: np.ndarray[tuple[int], np.dtype[np.intp]]
-
-    @classmethod
-    def of(cls, name: str, positions: Sequence[Position]) -> _Contour:
-        degrees = lonlat(positions)
-        indices = np.flatnonzero((degrees != np.roll(degrees, 1, axis=0)).any(axis=1))
-        if len(indices) < 3:
-            raise _too_few(name, degrees)
-        return cls(name, degrees[indices], indices)
-
-    def planar(self, frame: Frame) -> Polygon:
-        """The contour as a polygon that has an area; it may meet itself."""
-        xy = frame.to_planar(self.degrees)
-        if not np.isfinite(xy).all():
-            raise InvalidMission("reaches to the other side of the Earth", where=self.name)
-        hull = shapely.convex_hull(LineString(xy))
-        if hull.area < LEAST_WIDTH_M * hull.length:
-            if len(np.unique(self.degrees, axis=0)) < 3:
-                raise _too_few(self.name, self.degrees)
-            raise InvalidMission(
-                "has all its points on one line; expected a contour with an area", where=self.name
-            )
-        return Polygon(xy)
-
-
-def _too_few(name: str, degrees: FloatArray) -> InvalidMission:
-    distinct = len(np.unique(degrees, axis=0))
-    return InvalidMission(f"has {distinct} distinct points; expected at least 3", where=name)
-
-
-def _outline(contour: _Contour, frame: Frame) -> Polygon:
+def _outline(contour: Contour, frame: Frame) -> Polygon:
     polygon = contour.planar(frame)
     radius_m = np.hypot(*shapely.get_coordinates(polygon).T)
     if radius_m.max() > MAX_RADIUS_M:
@@ -170,7 +147,7 @@ def _outline(contour: _Contour, frame: Frame) -> Polygon:
     return shapely.normalize(polygon)
 
 
-def _crossing(contour: _Contour, frame: Frame, polygon: Polygon) -> InvalidMission:
+def _crossing(contour: Contour, frame: Frame, polygon: Polygon) -> InvalidMission:
     """Where an outline meets itself, and which of its edges do."""
     x, y = map(float, re.findall(r"\[(\S+) (\S+)\]", shapely.is_valid_reason(polygon))[0])
     xy = shapely.get_coordinates(polygon)
@@ -186,21 +163,13 @@ def _crossing(contour: _Contour, frame: Frame, polygon: Polygon) -> InvalidMissi
     )
 
 
-def _zones(mission: Mission, frame: Frame, outline: Polygon) -> tuple[tuple[Polygon, ...], tuple[str, ...]]:
-    zones: list[Polygon] = []
-    warnings: list[str] = []
-    shapely.prepare(outline)
-    for index, positions in enumerate(mission.forbidden_zones):
-        name = f"ForbiddenZones[{index}]"
-        zone = _Contour.of(name, positions).planar(frame)
-        parts = [zone] if zone.is_valid else _enclosed(zone)
-        if not zone.is_valid:
-            warnings.append(f"{name} meets itself: all that it encloses is forbidden")
-        if not shapely.intersects(outline, parts).any():
-            warnings.append(f"{name} lies outside {mission.outline_name}: it changes nothing")
-            continue
-        zones += parts
-    return tuple(zones), tuple(warnings)
+def _dangerous(mission: Mission, zones: Sequence[Zone]) -> tuple[DangerZone, ...]:
+    """The danger zones as stages are told of them, one a polygon."""
+    return tuple(
+        DangerZone(name=given.name or f"DangerZones[{index}]", area=area, probability=given.danger, per=given.per)
+        for index, (given, zone) in enumerate(zip(mission.danger_zones or (), zones, strict=True))
+        for area in zone.parts
+    )
 
 
 def _prior_warnings(mission: Mission, areas: tuple[WeightedArea, ...]) -> tuple[str, ...]:
@@ -252,12 +221,6 @@ def _require_afloat(name: str, place: Place, water: BaseGeometry) -> None:
         raise InvalidMission(
             f"lies {distance_m:.0f} m outside the water; expected a place in it or on its shore", where=name
         )
-
-
-def _enclosed(zone: Polygon) -> list[Polygon]:
-    """All that a contour which meets itself encloses: whichever way it was meant, nothing of it is entered."""
-    faces = shapely.polygonize([shapely.node(zone.exterior)])
-    return [Polygon(part.exterior) for part in shapely.get_parts(shapely.union_all(shapely.get_parts(faces)))]
 
 
 def _place(name: str, position: Position, frame: Frame, outline: Polygon) -> Place:

@@ -22,6 +22,7 @@ _JSON_NAMES = {
     "length_m": "Length",
     "start": "Start",
     "recovery": "Recovery",
+    "danger_factor": "Danger_factor",
 }
 
 
@@ -38,6 +39,8 @@ class GivenVehicle(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES
         Its speed and the greatest length of its path; the mission's own for its role where absent.
     start, recovery
         Where its path starts and ends; the mission's launch and recovery points where absent.
+    danger_factor
+        At least 1, which it is where absent: how much less fit it is for water with danger zones.
     extra
         Fields without a meaning here, kept as they came.
     """
@@ -48,6 +51,7 @@ class GivenVehicle(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES
     length_m: float | None = None
     start: Position | None = None
     recovery: Position | None = None
+    danger_factor: float | None = None
     extra: dict[str, Any] = {}
 
 
@@ -75,7 +79,7 @@ def vehicle_document(vehicle: GivenVehicle) -> dict[str, Any]:
 
 
 def require_distinct(vehicles: Sequence[GivenVehicle]) -> None:
-    """Check that every vehicle has a name of its own, and a speed and a range that are numbers above 0."""
+    """Check that every vehicle has a name of its own, a speed and a range above 0, and a factor of 1 at least."""
     seen: dict[str, int] = {}
     for index, vehicle in enumerate(vehicles):
         where = f"Vehicles[{index}]"
@@ -91,3 +95,6 @@ def require_distinct(vehicles: Sequence[GivenVehicle]) -> None:
                 raise InvalidMission(
                     f"is {value!r}; expected a finite number > 0", where=f"{where}.{_JSON_NAMES[field]}"
                 )
+        factor = vehicle.danger_factor
+        if factor is not None and not 1.0 <= factor < math.inf:
+            raise InvalidMission(f"is {factor!r}; expected a finite number >= 1", where=f"{where}.Danger_factor")

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from route_scenes import places_in, scene
 from shapely import Polygon, box
 
+from oxbow.contracts import DangerZone, Per
 from oxbow.errors import InvalidMission
-from oxbow.route import Danger, DangerZone, Per, RouteMethod, make_router
+from oxbow.route import Danger, RouteMethod, make_router
 
 quick = settings(deadline=None, max_examples=15, derandomize=True)
 every_method = pytest.mark.parametrize("method", RouteMethod)
@@ -20,11 +21,11 @@ MIDDLE = box(40, 30, 60, 70)
 
 
 def per_metre(probability, area=MIDDLE):
-    return DangerZone("shallows", area, probability)
+    return DangerZone(name="shallows", area=area, probability=probability, per=Per.METRE)
 
 
 def per_crossing(probability, area=MIDDLE):
-    return DangerZone("lane", area, probability, Per.CROSSING)
+    return DangerZone(name="lane", area=area, probability=probability)
 
 
 def edges(*places):

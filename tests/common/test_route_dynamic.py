@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from route_scenes import obstacle, places_in, scene
 from shapely import Polygon, box
 
+from oxbow.contracts import DangerZone, Per
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.route import Danger, DangerZone, DynamicRouter, RouteMethod, make_router
+from oxbow.route import Danger, DynamicRouter, RouteMethod, make_router
 from oxbow.testing import nasty_polygons
 
 quick = settings(deadline=None, max_examples=12, derandomize=True)
@@ -131,7 +132,8 @@ def test_bad_obstacles_are_named_and_change_nothing():
 
 
 def test_danger_on_the_way_is_told():
-    danger = Danger((DangerZone("shallows", box(30, 20, 70, 100), 0.05),), c_max_m=1e4)
+    shallows = DangerZone(name="shallows", area=box(30, 20, 70, 100), probability=0.05, per=Per.METRE)
+    danger = Danger((shallows,), c_max_m=1e4)
     router = DynamicRouter(box(0, 0, 100, 100), danger)
     router.put("wreck", box(45, 45, 55, 55))
     straight = router.route((10, 60), (90, 60))

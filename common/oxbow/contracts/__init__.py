@@ -16,6 +16,7 @@ from oxbow.contracts.certificate import (
     VariogramModel,
 )
 from oxbow.contracts.contour import ContourRequest, DroppedPart, FreeSpace
+from oxbow.contracts.danger import DANGER_DETOUR_M, DangerZone, Per
 from oxbow.contracts.decomposition import (
     Cell,
     CriticalKind,
@@ -53,6 +54,7 @@ __all__ = [
     "ASSIGN",
     "CERTIFY",
     "CONTOUR",
+    "DANGER_DETOUR_M",
     "DECOMPOSE",
     "DEFAULT_DEADLINE_S",
     "INTROSPECTION",
@@ -70,6 +72,7 @@ __all__ = [
     "ContourRequest",
     "CriticalKind",
     "CriticalPoint",
+    "DangerZone",
     "DecomposeRequest",
     "Decomposition",
     "Draw",
@@ -88,6 +91,7 @@ __all__ = [
     "MissionStatus",
     "PathPlan",
     "PathRequest",
+    "Per",
     "Place",
     "Role",
     "Share",

@@ -7,6 +7,7 @@ import math
 
 from shapely import LineString, Polygon
 
+from oxbow.contracts.danger import DANGER_DETOUR_M, DangerZone
 from oxbow.contracts.message import Message, Place, require_area, require_finite
 from oxbow.errors import InvalidMission
 
@@ -35,11 +36,13 @@ class Vehicle(Message, frozen=True, kw_only=True):
         The longest route that it may travel, from start to recovery: its range.
     start, recovery
         Where it is now and where it ends.
+    danger_factor
+        At least 1: how much less fit it is where danger is, `a` of Innocenti, Pollini and Bracci 2006, section 3.
 
     Raises
     ------
     InvalidMission
-        A vehicle without a name, a speed, a range or a place; the error names the vehicle.
+        A vehicle without a name, a speed, a range or a place, or a factor below 1; the error names the vehicle.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Vehicle(Message, frozen=True, kw_only=True):
     length_m: float
     start: Place
     recovery: Place
+    danger_factor: float = 1.0
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -58,6 +62,11 @@ class Vehicle(Message, frozen=True, kw_only=True):
                 raise InvalidMission(
                     f"is {value!r} {unit}; expected a finite number > 0", where=f"vehicle {self.name!r}: {field}"
                 )
+        if not 1.0 <= self.danger_factor < math.inf:
+            raise InvalidMission(
+                f"is {self.danger_factor!r}; expected a finite number >= 1",
+                where=f"vehicle {self.name!r}: danger_factor",
+            )
         for field in ("start", "recovery"):
             if not all(map(math.isfinite, getattr(self, field))):
                 raise InvalidMission(
@@ -95,6 +104,10 @@ class AssignRequest(Message, frozen=True, kw_only=True):
         What the slaves treat.
     swath_m
         The width that one pass over a hot spot treats.
+    danger_zones
+        What the slaves' routes avoid, as far as that is worth the way.
+    danger_detour_m
+        The detour that a chance of no harm e times as good is worth.
     seed
         Where clustering starts.
     """
@@ -105,11 +118,14 @@ class AssignRequest(Message, frozen=True, kw_only=True):
     footprint_m: float | None = None
     hot_spots: tuple[HotSpot, ...] = ()
     swath_m: float | None = None
+    danger_zones: tuple[DangerZone, ...] = ()
+    danger_detour_m: float = DANGER_DETOUR_M
     seed: int = 0
 
     def __post_init__(self) -> None:
         require_area(self, "free")
         require_finite(self, "footprint_m", "swath_m", above=0.0)
+        require_finite(self, "danger_detour_m", least=0.0)
         if not self.vehicles:
             raise InvalidMission("is empty; expected one vehicle or more", where="vehicles")
         names = [vehicle.name for vehicle in self.vehicles]

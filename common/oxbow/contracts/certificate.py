@@ -7,6 +7,7 @@ import math
 
 from shapely import LineString, Polygon
 
+from oxbow.contracts.danger import DangerZone
 from oxbow.contracts.message import Message, Place, require_area, require_finite
 from oxbow.errors import InvalidMission
 
@@ -62,7 +63,8 @@ class CertifyRequest(Track, frozen=True, kw_only=True):
     """A path to judge against the mission itself: the true outline and zones, not the planner's free space.
 
     The paths of a team are judged together: `others` are those of its further vehicles. `areas` are what the paths
-    are to cover where that is not all of the free space: the hot spots of a treatment.
+    are to cover where that is not all of the free space: the hot spots of a treatment. The probability of harm is
+    told where there are `danger_zones`.
     """
 
     outline: Polygon
@@ -71,6 +73,7 @@ class CertifyRequest(Track, frozen=True, kw_only=True):
     variogram: Variogram | None = None
     others: tuple[Track, ...] = ()
     areas: tuple[Polygon, ...] = ()
+    danger_zones: tuple[DangerZone, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -84,7 +87,10 @@ class CertifyRequest(Track, frozen=True, kw_only=True):
 
 
 class Conformance(Message, frozen=True, kw_only=True):
-    """What there is of a path, and whether it keeps the rules; defined in `docs/quality.md`."""
+    """What there is of a path, and whether it keeps the rules; defined in `docs/quality.md`.
+
+    `danger` is the probability of harm on the way, None where there are no danger zones.
+    """
 
     length_m: float
     duration_s: float
@@ -93,13 +99,14 @@ class Conformance(Message, frozen=True, kw_only=True):
     crossings: int
     outside_m: float
     unsafe_m: float
+    danger: float | None = None
 
 
 class Measures(Conformance, frozen=True, kw_only=True):
     """How good a path is against what is possible; the measures are defined in `docs/quality.md`.
 
-    Of several paths, `duration_s` is that of the longest, figures of the rules are sums, and coverage is that of
-    all of them together.
+    Of several paths, `duration_s` is that of the longest, figures of the rules are sums, `danger` is the
+    probability that any of them comes to harm, and coverage is that of all of them together.
 
     `cover_radius_m` are certified (low, high) bounds of the largest distance from a point of the free space to
     the path (report, section 1.2.1, MinMax); `least_radius_m` is the least any path of that length could reach.

@@ -1,6 +1,6 @@
 """Routes through the water: several methods behind one `Router`."""
 
-from oxbow.route.danger import NO_DANGER, Danger, DangerZone, Per
+from oxbow.route.danger import NO_DANGER, Danger
 from oxbow.route.dynamic import DynamicRouter
 from oxbow.route.methods import make_router
 from oxbow.route.route import Route, RouteMethod, Router
@@ -8,9 +8,7 @@ from oxbow.route.route import Route, RouteMethod, Router
 __all__ = [
     "NO_DANGER",
     "Danger",
-    "DangerZone",
     "DynamicRouter",
-    "Per",
     "Route",
     "RouteMethod",
     "Router",

@@ -11,7 +11,6 @@ is left out altogether, whatever `a`; `a` is at least 1, for Dijkstra's algorith
 
 from __future__ import annotations
 
-import enum
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,72 +18,16 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 import shapely
-from shapely import Polygon, STRtree
+from shapely import STRtree
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.contracts import FloatArray
+from oxbow.contracts import DangerZone, FloatArray, Per
 from oxbow.errors import InvalidMission
 
-__all__ = ["NO_DANGER", "Danger", "DangerZone", "Per"]
+__all__ = ["NO_DANGER", "Danger"]
 
 RIM_M = 1e-6
 """What of a zone's rim is not in it: a route along the outline runs outside, however it is rounded."""
-
-
-class Per(enum.StrEnum):
-    """What a zone's probability refers to."""
-
-    METRE = "metre"
-    CROSSING = "crossing"
-
-
-@dataclass(frozen=True)
-class DangerZone:
-    """An area that may be travelled, at a risk.
-
-    Parameters
-    ----------
-    name
-        What errors call it.
-    area
-        Its outline; a boat on the outline is outside.
-    probability
-        Of harm, 0 <= probability < 1, for each metre inside or for each crossing.
-    per
-        Which of the two. A crossing lasts from where a route enters the area, or starts in it, to where it leaves.
-
-    Raises
-    ------
-    InvalidMission
-        The probability is out of range, or the area is empty or not valid; names the zone.
-    """
-
-    name: str
-    area: Polygon
-    probability: float
-    per: Per = Per.METRE
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.probability < 1.0:
-            raise InvalidMission(
-                f"has danger {self.probability!r}; expected 0 <= danger < 1 (what must not be entered is a"
-                " forbidden zone)",
-                where=self.name,
-            )
-        if self.area.is_empty or not self.area.is_valid:
-            raise InvalidMission("is empty or not a valid polygon", where=self.name)
-
-    @property
-    def hazard(self) -> float:
-        """-log(1 - probability): hazards add up where probabilities of no harm multiply."""
-        return -math.log1p(-self.probability)
-
-    @cached_property
-    def core(self) -> BaseGeometry:
-        """The area without its rim."""
-        core = self.area.buffer(-RIM_M, join_style="mitre")
-        shapely.prepare(core)
-        return core
 
 
 @dataclass(frozen=True)
@@ -130,27 +73,40 @@ class Danger:
             return total
         lines = np.asarray(shapely.linestrings(np.stack([starts, ends], axis=1)))
         tree = STRtree(lines)
-        for zone in self.zones:
-            met = tree.query(zone.core, predicate="intersects")
-            inside = shapely.intersection(lines[met], zone.core)
+        for zone, core in zip(self.zones, self._cores, strict=True):
+            met = tree.query(core, predicate="intersects")
+            inside = shapely.intersection(lines[met], core)
             if zone.per is Per.METRE:
                 total[met] += zone.hazard * shapely.length(inside)
             else:
-                entered = shapely.get_num_geometries(inside) - _is_inside(zone, starts[met])
+                entered = shapely.get_num_geometries(inside) - _is_inside(core, starts[met])
                 total[met] += zone.hazard * np.maximum(entered, 0)
         return total
 
     def hazards_at(self, starts: FloatArray) -> FloatArray:
         """-log(1 - P) of starting at places, shape (n, 2): a crossing of each zone they lie in; shape (n,)."""
         total = np.zeros(len(starts))
-        for zone in self.zones:
+        for zone, core in zip(self.zones, self._cores, strict=True):
             if zone.per is Per.CROSSING:
-                total += zone.hazard * _is_inside(zone, starts)
+                total += zone.hazard * _is_inside(core, starts)
         return total
+
+    def probability(self, polyline: FloatArray) -> float:
+        """The probability of harm along a polyline, shape (n, 2): 1 - prod(1 - P_k) over its edges."""
+        starts, ends = polyline[:-1], polyline[1:]
+        hazard = self.hazards_at(starts[:1]).sum() + self.hazards(starts, ends).sum()
+        return -math.expm1(-hazard)
+
+    @cached_property
+    def _cores(self) -> tuple[BaseGeometry, ...]:
+        """The zones' areas without their rims, prepared."""
+        cores = tuple(zone.area.buffer(-RIM_M, join_style="mitre") for zone in self.zones)
+        shapely.prepare(cores)
+        return cores
 
 
 NO_DANGER = Danger()
 
 
-def _is_inside(zone: DangerZone, places: FloatArray) -> npt.NDArray[np.bool_]:
-    return np.asarray(shapely.contains_xy(zone.core, places))
+def _is_inside(core: BaseGeometry, places: FloatArray) -> npt.NDArray[np.bool_]:
+    return np.asarray(shapely.contains_xy(core, places))

@@ -1,0 +1,64 @@
+"""Danger zones, which more than one stage is told of: routes avoid them, and paths are judged by them."""
+
+from __future__ import annotations
+
+import enum
+import math
+
+from shapely import Polygon
+
+from oxbow.contracts.message import Message
+from oxbow.errors import InvalidMission
+
+__all__ = ["DANGER_DETOUR_M", "DangerZone", "Per"]
+
+DANGER_DETOUR_M = 1_000.0
+"""The detour that a chance of no harm e times as good is worth, where nobody says otherwise."""
+
+
+class Per(enum.StrEnum):
+    """What a zone's probability refers to."""
+
+    METRE = "metre"
+    CROSSING = "crossing"
+
+
+class DangerZone(Message, frozen=True, kw_only=True):
+    """An area that may be travelled, at a risk.
+
+    Parameters
+    ----------
+    name
+        What errors call it.
+    area
+        Its outline; a boat on the outline is outside.
+    probability
+        Of harm, 0 <= probability < 1, for each metre inside or for each crossing.
+    per
+        Which of the two. A crossing lasts from where a route enters the area, or starts in it, to where it leaves.
+
+    Raises
+    ------
+    InvalidMission
+        The probability is out of range, or the area is empty or not valid; names the zone.
+    """
+
+    name: str
+    area: Polygon
+    probability: float
+    per: Per = Per.CROSSING
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.probability < 1.0:
+            raise InvalidMission(
+                f"has danger {self.probability!r}; expected 0 <= danger < 1 (what must not be entered is a"
+                " forbidden zone)",
+                where=self.name,
+            )
+        if self.area.is_empty or not self.area.is_valid:
+            raise InvalidMission("is empty or not a valid polygon", where=self.name)
+
+    @property
+    def hazard(self) -> float:
+        """-log(1 - probability): hazards add up where probabilities of no harm multiply."""
+        return -math.log1p(-self.probability)
