@@ -20,7 +20,8 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.sparse.linalg import spsolve
 
 from oxbow.contracts import FloatArray
-from oxbow.mesh import Indices, Mesh
+from oxbow.mesh import Mesh
+from oxbow.triangles import Indices
 
 __all__ = ["balanced_shares", "border_lengths_m", "imbalance"]
 

@@ -12,7 +12,8 @@ from shapely import Polygon
 
 from oxbow.contracts import FloatArray, Place
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.mesh import Indices, Mesh, propagate
+from oxbow.mesh import Mesh, propagate
+from oxbow.triangles import Indices
 from oxbow_assignment.balancing import balanced_shares, border_lengths_m, imbalance
 
 __all__ = ["BALANCE", "Partition", "balanced_partition", "wavefront_partition"]

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from oxbow.contracts import FloatArray
+from oxbow.triangles import cross
 
 __all__ = ["deviations", "strip_ends"]
 
@@ -82,7 +83,7 @@ def _corners(ring: FloatArray) -> list[int]:
     from_start = ring - ring[0]
     far = int(np.argmax((from_start**2).sum(axis=1)))
     along = from_start[far]
-    aside = int(np.argmax(np.abs(from_start[:, 0] * along[1] - from_start[:, 1] * along[0])))
+    aside = int(np.argmax(np.abs(cross(from_start, along))))
     return [0, *sorted((far, aside)), len(ring) - 1]
 
 

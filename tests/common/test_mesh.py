@@ -28,13 +28,15 @@ def require_tiling(mesh: Mesh, area: Polygon) -> None:
 
 
 def require_neighbours(mesh: Mesh) -> None:
-    """Neighbours are mutual, and share the edge opposite the corner they stand at."""
-    triangle, k = np.nonzero(mesh.neighbours >= 0)
-    beyond = mesh.neighbours[triangle, k]
+    """Neighbours are mutual, and share the side that they stand at, which is as long as is said."""
+    triangle, side = np.nonzero(mesh.neighbours >= 0)
+    beyond = mesh.neighbours[triangle, side]
     assert (mesh.neighbours[beyond] == triangle[:, None]).any(axis=1).all()
-    for shift in (1, 2):
-        ends = mesh.triangles[triangle, (k + shift) % 3]
+    tails, heads = (mesh.triangles[triangle, (side + shift) % 3] for shift in (0, 1))
+    for ends in (tails, heads):
         assert (mesh.triangles[beyond] == ends[:, None]).any(axis=1).all()
+    lengths_m = np.hypot(*(mesh.points[heads] - mesh.points[tails]).T)
+    assert mesh.edge_lengths_m[triangle, side] == pytest.approx(lengths_m)
 
 
 def border_m(mesh: Mesh) -> float:

@@ -12,6 +12,7 @@ from oxbow.contracts import DangerZone, Per
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.route import Danger, DynamicRouter, RouteMethod, make_router
 from oxbow.testing import nasty_polygons
+from oxbow.triangles import cross
 
 quick = settings(deadline=None, max_examples=12, derandomize=True)
 GRID_M = 1e-5
@@ -24,21 +25,20 @@ def expected_water(water, router):
 
 def require_triangulation(mesh, water):
     """It tiles the water, ends at its shore, and is constrained Delaunay."""
-    twins = mesh.twins.ravel()
-    inner = np.flatnonzero(twins >= 0)
-    assert np.array_equal(twins[twins[inner]], inner)
-    assert np.array_equal(mesh.tails[inner], mesh.heads[twins[inner]])
+    inner = np.flatnonzero(mesh.twins >= 0)
+    assert np.array_equal(mesh.twins[mesh.twins[inner]], inner)
+    assert np.array_equal(mesh.tails[inner], mesh.heads[mesh.twins[inner]])
     assert shapely.area(mesh.polygons).sum() == pytest.approx(water.area, abs=1e-2)
     shore_m = np.hypot(*(mesh.heads - mesh.tails)[mesh.shore].T).sum()
     assert shore_m == pytest.approx(water.length, abs=1e-2)
     tail, head = mesh.tails[inner], mesh.heads[inner]
-    apexes = [mesh.vertices[mesh.corners[sides // 3, (sides + 2) % 3]] for sides in (inner, twins[inner])]
+    apexes = [mesh.corners[sides // 3, (sides + 2) % 3] for sides in (inner, mesh.twins[inner])]
     angles = [angle_rad(tail - apex, head - apex) for apex in apexes]
     assert (angles[0] + angles[1] <= np.pi + 1e-6).all()
 
 
 def angle_rad(a, b):
-    return np.abs(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)))
+    return np.abs(np.arctan2(cross(a, b), (a * b).sum(axis=1)))
 
 
 def shuffle(router, rng, steps, low, high):
@@ -68,14 +68,14 @@ def test_every_change_leaves_a_delaunay_triangulation_of_the_water(seed):
 def test_obstacles_come_and_go_in_nasty_shapes(name):
     water = nasty_polygons()[name]
     router = DynamicRouter(water)
-    before = len(router.mesh.corners)
+    before = len(router.mesh.triangles)
     low, high = np.reshape(water.bounds, (2, 2))
     for _ in shuffle(router, np.random.default_rng(5), 6, low, high):
         on_grid = shapely.set_precision(water, 2.0**-20)
         require_triangulation(router.mesh, expected_water(on_grid, router))
     for obstacle_name in list(router.obstacles):
         router.remove(obstacle_name)
-    assert len(router.mesh.corners) == before
+    assert len(router.mesh.triangles) == before
 
 
 @pytest.mark.parametrize("method", [RouteMethod.VISIBILITY, RouteMethod.FUNNEL, RouteMethod.INCENTERS])
@@ -103,7 +103,7 @@ def test_an_obstacle_in_the_way_is_gone_round_and_forgotten():
     router.put("wreck", box(40, 20, 60, 80))
     router.remove("wreck")
     assert not router.obstacles
-    assert len(router.mesh.corners) == 2
+    assert len(router.mesh.triangles) == 2
     assert router.route((10, 50), (90, 50)).length_m == pytest.approx(80)
 
 

@@ -2,7 +2,6 @@
 
 from oxbow.mesh.generation import mesh_area
 from oxbow.mesh.mesh import AngleStatistics, Mesh
-from oxbow.mesh.triangulation import Indices
 from oxbow.mesh.wavefront import Wavefront, propagate
 
-__all__ = ["AngleStatistics", "Indices", "Mesh", "Wavefront", "mesh_area", "propagate"]
+__all__ = ["AngleStatistics", "Mesh", "Wavefront", "mesh_area", "propagate"]

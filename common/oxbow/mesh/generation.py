@@ -63,7 +63,6 @@ def mesh_area(
     mesh = Triangulation.of(border).with_points(_lattice(local, border, PITCH * edge_m))
     mesh = relaxed(refined(mesh, edge_m, 0.0), edge_m, relaxations)
     mesh = refined(mesh, edge_m, math.radians(least_angle_deg))
-    mesh = mesh.without_flat_ears()
     return Mesh.of(Triangulation(mesh.points + origin, mesh.triangles))
 
 

@@ -12,7 +12,8 @@ from scipy.sparse import csr_array
 from shapely import Polygon
 
 from oxbow.contracts import FloatArray
-from oxbow.mesh.triangulation import SIDES, Indices, Triangulation, cross
+from oxbow.mesh.triangulation import Triangulation
+from oxbow.triangles import Indices, angles_rad, doubled_areas, side_lengths
 
 __all__ = ["AngleStatistics", "Mesh"]
 
@@ -51,7 +52,7 @@ class Mesh:
     triangles : ndarray of int, shape (m, 3)
         Vertices of every triangle, counterclockwise.
     neighbours : ndarray of int, shape (m, 3)
-        ``neighbours[t, k]`` is the triangle beyond the edge opposite corner k of triangle t; -1 beyond the border.
+        ``neighbours[t, j]`` is the triangle beyond side j of triangle t (`oxbow.triangles`); -1 beyond the border.
     """
 
     points: FloatArray
@@ -81,20 +82,22 @@ class Mesh:
     @cached_property
     def areas_m2(self) -> FloatArray:
         """Area of every triangle, shape (m,)."""
-        return cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0]) / 2
+        return doubled_areas(self.corners) / 2
 
     @cached_property
     def edge_lengths_m(self) -> FloatArray:
-        """Length of the edge opposite each corner, shape (m, 3)."""
-        ends = self.corners[:, SIDES]
-        return np.asarray(np.hypot(*np.moveaxis(ends[:, :, 1] - ends[:, :, 0], 2, 0)))
+        """Length of each side, shape (m, 3)."""
+        return side_lengths(self.corners)
+
+    @cached_property
+    def edge_middles(self) -> FloatArray:
+        """The middle of each side, shape (m, 3, 2)."""
+        return (self.corners + np.roll(self.corners, -1, axis=1)) / 2
 
     @cached_property
     def angles_rad(self) -> FloatArray:
         """Angle at each corner, shape (m, 3)."""
-        towards = self.corners[:, SIDES] - self.corners[:, :, None]
-        dot = (towards[:, :, 0] * towards[:, :, 1]).sum(axis=2)
-        return np.asarray(np.arctan2(cross(towards[:, :, 0], towards[:, :, 1]), dot))
+        return angles_rad(self.corners)
 
     @cached_property
     def angle_statistics(self) -> AngleStatistics:
@@ -121,24 +124,18 @@ class Mesh:
     @cached_property
     def graph(self) -> csr_array[np.float64]:
         """Neighbouring triangles, and the way from one's centroid to the other's over the middle of their edge."""
-        triangle, k = np.nonzero(self.neighbours >= 0)
-        gate = self.corners[triangle[:, None], SIDES[k]].mean(axis=1)
-        half = np.hypot(*(self.centroids[triangle] - gate).T)
-        one_way = csr_array((half, (triangle, self.neighbours[triangle, k])), shape=(len(self), len(self)))
+        triangle, side = np.nonzero(self.neighbours >= 0)
+        half = np.hypot(*(self.centroids[triangle] - self.edge_middles[triangle, side]).T)
+        one_way = csr_array((half, (triangle, self.neighbours[triangle, side])), shape=(len(self), len(self)))
         return csr_array(one_way + one_way.T)
 
     def subdivided(self) -> Mesh:
         """Every triangle t divided in four of its shape, 4 t to 4 t + 3, at the middles of its edges."""
-        sides = np.sort(self.triangles[:, SIDES].reshape(-1, 2), axis=1)
-        edges, index = np.unique(sides, axis=0, return_inverse=True)
+        ends = np.stack([self.triangles, np.roll(self.triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+        edges, index = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
         a, b, c = self.triangles.T
-        opposite_a, opposite_b, opposite_c = (len(self.points) + index.reshape(-1, 3)).T
-        quarters = [
-            [a, opposite_c, opposite_b],
-            [b, opposite_a, opposite_c],
-            [c, opposite_b, opposite_a],
-            [opposite_a, opposite_b, opposite_c],
-        ]
+        ab, bc, ca = (len(self.points) + index.reshape(-1, 3)).T
+        quarters = [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
         triangles = np.moveaxis(np.array(quarters), 2, 0).reshape(-1, 3)
         return Mesh.of(Triangulation(np.vstack([self.points, self.points[edges].mean(axis=1)]), triangles))
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from oxbow.contracts import FloatArray
-from oxbow.mesh.triangulation import Triangulation, cross
+from oxbow.mesh.triangulation import Triangulation
+from oxbow.triangles import cross
 
 __all__ = ["relaxed"]
 
@@ -24,7 +25,7 @@ def relaxed(mesh: Triangulation, edge_m: float, rounds: int) -> Triangulation:
     """
     for _ in range(rounds):
         aims = np.where(mesh.border_points[:, None], mesh.points, _cell_centroids(mesh))
-        mesh = _moved(mesh, aims, edge_m).flipped()
+        mesh = _moved(mesh, aims, edge_m).legalised()
     return mesh
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from oxbow.mesh.mesh import Mesh
-from oxbow.mesh.triangulation import Indices
+from oxbow.triangles import Indices
 
 __all__ = ["Wavefront", "propagate"]
 

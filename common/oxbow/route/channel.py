@@ -28,7 +28,7 @@ from oxbow.route.route import (
     require_way,
 )
 from oxbow.route.search import Arcs, Ways, cheapest_ways, distinct
-from oxbow.route.triangulation import Indices
+from oxbow.triangles import Indices
 
 __all__ = ["Channel", "ChannelRouter", "Drawn"]
 
@@ -101,7 +101,7 @@ class ChannelRouter:
     @cached_property
     def gates(self) -> Indices:
         """The sides between two triangles; each is passed outwards, out of the triangle whose side it is."""
-        return np.flatnonzero(self.mesh.twins.ravel() >= 0)
+        return np.flatnonzero(self.mesh.twins >= 0)
 
     @cached_property
     def _middles(self) -> FloatArray:
@@ -111,7 +111,7 @@ class ChannelRouter:
     @cached_property
     def _arcs(self) -> Arcs:
         """From each gate to the other gates of the triangle beyond it."""
-        twins = self.mesh.twins.ravel()
+        twins = self.mesh.twins
         beyond = 3 * (twins[self.gates] // 3)[:, None] + np.arange(3)
         onward = (twins[beyond] >= 0) & (beyond != twins[self.gates][:, None])
         tails = np.broadcast_to(self.gates[:, None], beyond.shape)[onward]
@@ -125,8 +125,8 @@ class ChannelRouter:
         places = np.vstack([self._middles, points, points])
         side = (3 * at.triangle[:, None] + np.arange(3)).ravel()
         point = np.repeat(at.place, 3)
-        inner = self.mesh.twins.ravel()[side] >= 0
-        out, into, point = side[inner], self.mesh.twins.ravel()[side[inner]], point[inner]
+        inner = self.mesh.twins[side] >= 0
+        out, into, point = side[inner], self.mesh.twins[side[inner]], point[inner]
         first, second = at.companions()
         arcs = self._arcs
         for tails, heads in (
@@ -141,7 +141,7 @@ class ChannelRouter:
     def _channel(self, network: _Network, start: int, goal: int) -> Channel:
         gates = np.array(network.ways.way(start, network.arrival + goal)[1:-1], dtype=np.intp)
         if len(gates):
-            triangles = np.concatenate([gates[:1] // 3, self.mesh.twins.ravel()[gates] // 3])
+            triangles = np.concatenate([gates[:1] // 3, self.mesh.twins[gates] // 3])
         else:
             at = network.at
             shared = np.intersect1d(at.triangle[at.place == start], at.triangle[at.place == goal])
@@ -151,7 +151,7 @@ class ChannelRouter:
             goal=network.points[goal],
             left=self.mesh.heads[gates],
             right=self.mesh.tails[gates],
-            corners=self.mesh.vertices[self.mesh.corners[triangles]],
+            corners=self.mesh.corners[triangles],
         )
 
 

@@ -23,7 +23,7 @@ from oxbow.route.mesh import ROUNDING_M, Mesh
 from oxbow.route.methods import router_on
 from oxbow.route.retriangulation import GRID_M, retriangulated
 from oxbow.route.route import Route, RouteMethod, Router
-from oxbow.route.triangulation import Geometries
+from oxbow.triangles import Geometries
 
 __all__ = ["DynamicRouter"]
 
@@ -113,7 +113,7 @@ class DynamicRouter:
         if not area.is_empty:
             obstacles[name] = area
         mesh = retriangulated(self.mesh, changed, _Site(self._open_water, tuple(obstacles.values())))
-        if not len(mesh.corners):
+        if not len(mesh.triangles):
             raise Infeasible("covers all the water that is left", where=name)
         self._obstacles = obstacles
         self.mesh = mesh

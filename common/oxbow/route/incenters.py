@@ -17,9 +17,8 @@ import numpy as np
 
 from oxbow.contracts import FloatArray
 from oxbow.route.channel import Channel
-from oxbow.route.mesh import cross
 from oxbow.route.sights import Mask
-from oxbow.route.triangulation import Indices
+from oxbow.triangles import Indices, cross, side_lengths
 
 __all__ = ["incenter_line", "incenters"]
 
@@ -85,9 +84,8 @@ def _direction_rad(vectors: FloatArray, axis: FloatArray) -> FloatArray:
 
 def incenters(corners: FloatArray) -> FloatArray:
     """The centres of the circles inscribed in triangles, shape (n, 3, 2) to (n, 2)."""
-    opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
-    weight = np.hypot(opposite[..., 0], opposite[..., 1])
-    weight /= weight.sum(axis=1, keepdims=True)
+    opposite = np.roll(side_lengths(corners), -1, axis=1)
+    weight = opposite / opposite.sum(axis=1, keepdims=True)
     # Relative to a corner: far from the origin the sum would lose digits that a sliver needs.
     base = corners[:, :1]
     return np.asarray(base[:, 0] + ((corners - base) * weight[..., None]).sum(axis=1))

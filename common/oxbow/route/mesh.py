@@ -16,9 +16,9 @@ from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.route.triangulation import Geometries, Indices, parted, triangulated, twins_of
+from oxbow.triangles import Geometries, Indices, angles_rad, following, triangulated, twins_of
 
-__all__ = ["ROUNDING_M", "Mesh", "Touches", "cross", "following"]
+__all__ = ["ROUNDING_M", "Mesh", "Touches"]
 
 ROUNDING_M = 1e-6
 """A place this near to the water is in it."""
@@ -60,21 +60,20 @@ class Touches:
 class Mesh:
     """A constrained Delaunay triangulation of water, as sides of triangles.
 
-    Side s = 3 t + j of triangle t runs counterclockwise from its corner j to its corner j + 1, and is spoken of as
-    corner s where its tail is meant. What two triangles share are two sides, each other's twin.
+    Side s = 3 t + j of triangle t (`oxbow.triangles`) is spoken of as corner s where its tail is meant.
 
     Parameters
     ----------
-    vertices : ndarray, shape (m, 2)
-        In metres.
-    corners : ndarray of int, shape (n, 3)
+    points : ndarray, shape (n, 2)
+        The vertices, in metres.
+    triangles : ndarray of int, shape (m, 3)
         The vertices of each triangle, counterclockwise.
-    twins : ndarray of int, shape (n, 3)
+    twins : ndarray of int, shape (3 m,)
         Each side's twin, -1 where it is shore.
     """
 
-    vertices: FloatArray
-    corners: Indices
+    points: FloatArray
+    triangles: Indices
     twins: Indices
 
     @classmethod
@@ -88,23 +87,28 @@ class Mesh:
         """
         if water.is_empty or not water.is_valid:
             raise InvalidMission("is empty or not a valid polygon", where="water")
-        vertices, corners = triangulated(parted(water, outlines) if outlines else water)
-        return cls(vertices, corners, twins_of(corners))
+        points, triangles = triangulated(_parted(water, outlines) if outlines else water)
+        return cls(points, triangles, twins_of(triangles))
 
     @cached_property
     def tails(self) -> FloatArray:
-        """Where each side begins, shape (3 n, 2)."""
-        return np.asarray(self.vertices[self.corners.ravel()])
+        """Where each side begins, shape (3 m, 2)."""
+        return np.asarray(self.points[self.triangles.ravel()])
 
     @cached_property
     def heads(self) -> FloatArray:
-        """Where each side ends, shape (3 n, 2)."""
-        return np.asarray(self.vertices[np.roll(self.corners, -1, axis=1).ravel()])
+        """Where each side ends, shape (3 m, 2)."""
+        return np.asarray(self.points[np.roll(self.triangles, -1, axis=1).ravel()])
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """Coordinates of the corners, shape (m, 3, 2)."""
+        return np.asarray(self.points[self.triangles])
 
     @cached_property
     def polygons(self) -> Geometries:
         """The triangles as polygons."""
-        return np.asarray(shapely.polygons(self.vertices[self.corners]))
+        return np.asarray(shapely.polygons(self.corners))
 
     @cached_property
     def _index(self) -> STRtree:
@@ -113,7 +117,7 @@ class Mesh:
     @cached_property
     def shore(self) -> Indices:
         """The sides that are shore."""
-        return np.flatnonzero(self.twins.ravel() < 0)
+        return np.flatnonzero(self.twins < 0)
 
     @cached_property
     def _shore_index(self) -> STRtree:
@@ -127,23 +131,18 @@ class Mesh:
 
     @cached_property
     def sectors(self) -> Indices:
-        """Corners that are one place of the water have one number, shape (3 n,).
+        """Corners that are one place of the water have one number, shape (3 m,).
 
         A vertex at which shores touch is several places: one for each part of the water round it.
         """
-        twins = self.twins.ravel()
-        sides = np.flatnonzero(twins >= 0)
-        same = coo_array((np.ones(len(sides)), (sides, following(twins[sides]))), shape=(len(twins), len(twins)))
+        sides, count = np.flatnonzero(self.twins >= 0), len(self.twins)
+        same = coo_array((np.ones(len(sides)), (sides, following(self.twins[sides]))), shape=(count, count))
         return np.asarray(connected_components(same, directed=False)[1], dtype=np.intp)
 
     @cached_property
     def angles(self) -> FloatArray:
         """The water's angle at each sector, in radians."""
-        apexes = self.vertices[self.corners]
-        ahead = np.roll(apexes, -1, axis=1) - apexes
-        behind = np.roll(apexes, 1, axis=1) - apexes
-        angle = np.arctan2(cross(ahead, behind), (ahead * behind).sum(axis=2))
-        return np.asarray(np.bincount(self.sectors, angle.ravel()), dtype=np.float64)
+        return np.asarray(np.bincount(self.sectors, angles_rad(self.corners).ravel()), dtype=np.float64)
 
     def clearance_m(self, line: LineString) -> float:
         """The least distance from a line to the shore."""
@@ -194,14 +193,12 @@ class Mesh:
         return touches
 
 
-def following(sides: Indices) -> Indices:
-    """The next sides of the same triangles."""
-    return np.asarray(sides + np.where(sides % 3 == 2, -2, 1))
-
-
-def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """The cross product of plane vectors, over the last axis: positive where b lies to the left of a."""
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+def _parted(water: Polygon | MultiPolygon, outlines: Sequence[BaseGeometry]) -> Geometries:
+    """The parts into which lines cut a region; neighbours have the vertices of their common border in common."""
+    lines = shapely.get_parts(shapely.node(shapely.geometrycollections([water.boundary, *outlines])))
+    faces = shapely.get_parts(shapely.polygonize(lines))
+    shapely.prepare(water)
+    return np.asarray(faces[shapely.contains(water, shapely.point_on_surface(faces))])
 
 
 def _text(place: FloatArray) -> str:

@@ -19,8 +19,8 @@ from shapely import STRtree
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray
-from oxbow.route.mesh import ROUNDING_M, Mesh, following
-from oxbow.route.triangulation import Geometries, Indices, paired, triangulated, twins_of
+from oxbow.route.mesh import ROUNDING_M, Mesh
+from oxbow.triangles import Geometries, Indices, following, paired, triangulated, twins_of
 
 __all__ = ["GRID_M", "Site", "retriangulated"]
 
@@ -69,10 +69,10 @@ def _hole(mesh: Mesh, cavity: Indices, changed: BaseGeometry, site: Site) -> Geo
     All lines are noded together, the shores as they were given and not as earlier changes cut them: what
     rounding did to a shore is undone with the obstacle that was there.
     """
-    pieces = np.asarray(shapely.polygons(mesh.vertices[mesh.corners[cavity]]))
-    border = mesh.twins[cavity].ravel()
+    pieces = np.asarray(shapely.polygons(mesh.corners[cavity]))
+    border = mesh.twins.reshape(-1, 3)[cavity].ravel()
     border = border[(border >= 0) & ~np.isin(border // 3, cavity)]
-    ends = mesh.vertices[mesh.corners.ravel()[np.stack([border, following(border)], axis=1)]]
+    ends = np.stack([mesh.tails[border], mesh.heads[border]], axis=1)
     parts = shapely.get_parts(shapely.geometrycollections([changed, *pieces]))
     lines = np.concatenate([shapely.linestrings(ends), site.shores_near(parts)])
     noded = shapely.union_all(lines, grid_size=GRID_M)
@@ -88,44 +88,43 @@ def _touched(mesh: Mesh, area: BaseGeometry) -> Indices:
     """The triangles that meet an area, or did before vertices on its outline were rounded."""
     low, high = np.reshape(area.bounds, (2, 2)) + np.array([[-ROUNDING_M], [ROUNDING_M]])
     # On which sides of the area's box a vertex lies, as in D. Cohen and I. Sutherland's clipping.
-    outside = np.hstack([mesh.vertices < low, mesh.vertices > high]) @ np.array([1, 2, 4, 8], dtype=np.uint8)
-    near = np.flatnonzero(np.bitwise_and.reduce(outside[mesh.corners.T]) == 0)
-    triangles = shapely.polygons(mesh.vertices[mesh.corners[near]])
+    outside = np.hstack([mesh.points < low, mesh.points > high]) @ np.array([1, 2, 4, 8], dtype=np.uint8)
+    near = np.flatnonzero(np.bitwise_and.reduce(outside[mesh.triangles.T]) == 0)
+    triangles = shapely.polygons(mesh.corners[near])
     return np.asarray(near[shapely.dwithin(area, triangles, ROUNDING_M)])
 
 
 def _spliced(mesh: Mesh, cavity: Indices, faces: Geometries) -> tuple[_Splice, Indices]:
     """The mesh with another triangulation in a cavity, and the triangles outside to which that does not fit."""
     places, fresh = triangulated(faces)
-    vertices, number = _numbered(mesh, cavity, places)
-    kept = np.ones(len(mesh.corners), dtype=np.bool_)
+    points, number = _numbered(mesh, cavity, places)
+    kept = np.ones(len(mesh.triangles), dtype=np.bool_)
     kept[cavity] = False
     rank = np.where(kept, np.cumsum(kept) - 1, -1)
-    border = mesh.twins[cavity].ravel()
+    border = mesh.twins.reshape(-1, 3)[cavity].ravel()
     border = border[(border >= 0) & kept[border // 3]]
     first = 3 * np.count_nonzero(kept)
     fresh_twins = twins_of(fresh)
-    corners = np.vstack([mesh.corners[kept], number[fresh]])
-    twins = np.vstack([_renumbered(mesh.twins[kept], rank), np.where(fresh_twins >= 0, fresh_twins + first, -1)])
+    triangles = np.vstack([mesh.triangles[kept], number[fresh]])
+    kept_twins = _renumbered(mesh.twins[np.repeat(kept, 3)], rank)
+    twins = np.concatenate([kept_twins, np.where(fresh_twins >= 0, fresh_twins + first, -1)])
     outer = _renumbered(border, rank)
-    open_sides = np.concatenate([outer, first + np.flatnonzero(fresh_twins.ravel() < 0)])
-    one, other = paired(corners.ravel()[open_sides], corners.ravel()[following(open_sides)])
+    open_sides = np.concatenate([outer, first + np.flatnonzero(fresh_twins < 0)])
+    one, other = paired(triangles.ravel()[open_sides], triangles.ravel()[following(open_sides)])
     one, other = open_sides[one], open_sides[other]
-    twins.ravel()[one], twins.ravel()[other] = other, one
-    loose = border[twins.ravel()[outer] < 0] // 3
-    return _Splice(vertices, corners, twins, outer), loose
+    twins[one], twins[other] = other, one
+    loose = border[twins[outer] < 0] // 3
+    return _Splice(points, triangles, twins, outer), loose
 
 
 def _numbered(mesh: Mesh, cavity: Indices, places: FloatArray) -> tuple[FloatArray, Indices]:
     """All vertices, and the numbers of places among them: those that the cavity had keep theirs."""
-    old = np.unique(mesh.corners[cavity])
-    number = {
-        place: int(vertex) for place, vertex in zip(map(tuple, mesh.vertices[old].tolist()), old, strict=True)
-    }
+    old = np.unique(mesh.triangles[cavity])
+    number = {place: int(vertex) for place, vertex in zip(map(tuple, mesh.points[old].tolist()), old, strict=True)}
     new = [place for place in map(tuple, places.tolist()) if place not in number]
-    number |= {place: len(mesh.vertices) + rank for rank, place in enumerate(new)}
-    vertices = np.vstack([mesh.vertices, np.reshape(new, (-1, 2))])
-    return vertices, np.array([number[place] for place in map(tuple, places.tolist())], dtype=np.intp)
+    number |= {place: len(mesh.points) + rank for rank, place in enumerate(new)}
+    points = np.vstack([mesh.points, np.reshape(new, (-1, 2))])
+    return points, np.array([number[place] for place in map(tuple, places.tolist())], dtype=np.intp)
 
 
 def _renumbered(sides: Indices, rank: Indices) -> Indices:
@@ -138,8 +137,8 @@ def _renumbered(sides: Indices, rank: Indices) -> Indices:
 class _Splice:
     """A triangulation that may not be Delaunay at some sides."""
 
-    vertices: FloatArray
-    corners: Indices
+    points: FloatArray
+    triangles: Indices
     twins: Indices
     suspects: Indices
 
@@ -148,18 +147,18 @@ class _Splice:
         pending = self.suspects.tolist()
         while pending:
             side = pending.pop()
-            twin = int(self.twins.ravel()[side])
+            twin = int(self.twins[side])
             if twin >= 0 and not self._is_delaunay(side, twin):
                 pending += self._flip(side, twin)
-        used = np.zeros(len(self.vertices), dtype=np.bool_)
-        used[self.corners] = True
-        return Mesh(self.vertices[used], (np.cumsum(used) - 1)[self.corners], self.twins)
+        used = np.zeros(len(self.points), dtype=np.bool_)
+        used[self.triangles] = True
+        return Mesh(self.points[used], (np.cumsum(used) - 1)[self.triangles], self.twins)
 
     def _is_delaunay(self, side: int, twin: int) -> bool:
         """Whether the angles opposite a side and its twin come to half a turn at most."""
         sines, cosines = [], []
         for t, j in (divmod(side, 3), divmod(twin, 3)):
-            (ax, ay), (bx, by), (cx, cy) = self.vertices[self.corners[t, [j, j - 2, j - 1]]].tolist()
+            (ax, ay), (bx, by), (cx, cy) = self.points[self.triangles[t, [j, j - 2, j - 1]]].tolist()
             scale = math.hypot(ax - cx, ay - cy) * math.hypot(bx - cx, by - cy)
             sines.append(((ax - cx) * (by - cy) - (ay - cy) * (bx - cx)) / scale)
             cosines.append(((ax - cx) * (bx - cx) + (ay - cy) * (by - cy)) / scale)
@@ -169,14 +168,15 @@ class _Splice:
     def _flip(self, side: int, twin: int) -> list[int]:
         """Exchange the diagonal of two triangles' quadrangle; the four sides round it."""
         (t, j), (u, k) = divmod(side, 3), divmod(twin, 3)
-        a, b, c = self.corners[t, [j, j - 2, j - 1]].tolist()
-        d = int(self.corners[u, k - 1])
-        bc, ca = self.twins[t, j - 2], self.twins[t, j - 1]
-        ad, db = self.twins[u, k - 2], self.twins[u, k - 1]
-        self.corners[t], self.corners[u] = (a, d, c), (d, b, c)
-        self.twins[t], self.twins[u] = (ad, 3 * u + 2, ca), (db, bc, 3 * t + 1)
+        a, b, c = self.triangles[t, [j, j - 2, j - 1]].tolist()
+        d = int(self.triangles[u, k - 1])
+        twins = self.twins.reshape(-1, 3)
+        bc, ca = twins[t, j - 2], twins[t, j - 1]
+        ad, db = twins[u, k - 2], twins[u, k - 1]
+        self.triangles[t], self.triangles[u] = (a, d, c), (d, b, c)
+        twins[t], twins[u] = (ad, 3 * u + 2, ca), (db, bc, 3 * t + 1)
         around = [3 * t, 3 * t + 2, 3 * u, 3 * u + 1]
         for outside, inside in zip((ad, ca, db, bc), around, strict=True):
             if outside >= 0:
-                self.twins.ravel()[outside] = inside
+                self.twins[outside] = inside
         return around

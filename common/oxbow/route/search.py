@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from oxbow.contracts import FloatArray
 from oxbow.route.danger import Danger
-from oxbow.route.triangulation import Indices
+from oxbow.triangles import Indices
 
 __all__ = ["Arcs", "Ways", "cheapest_ways", "distinct"]
 

@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from oxbow.contracts import FloatArray
-from oxbow.route.mesh import Mesh, Touches, cross, following
-from oxbow.route.triangulation import Indices
+from oxbow.route.mesh import Mesh, Touches
+from oxbow.triangles import Indices, cross, following
 
 __all__ = ["IN_LINE", "Mask", "Sights", "sights"]
 
@@ -97,22 +97,21 @@ def _first_cones(mesh: Mesh, eyes: FloatArray, at: Touches) -> _Cones:
     eye = np.repeat(at.place, 3)
     side = (3 * at.triangle[:, None] + np.arange(3)).ravel()
     right, left = mesh.tails[side] - eyes[eye], mesh.heads[side] - eyes[eye]
-    through = _is_left(left, of=right) & (mesh.twins.ravel()[side] >= 0)
-    return _Cones(eye[through], mesh.twins.ravel()[side[through]], right[through], left[through])
+    through = _is_left(left, of=right) & (mesh.twins[side] >= 0)
+    return _Cones(eye[through], mesh.twins[side[through]], right[through], left[through])
 
 
 def _parted(mesh: Mesh, cones: _Cones, apex: FloatArray) -> _Cones:
     """The cones beyond the triangles entered; they part at the corner opposite, `apex` as seen from the eye."""
     to_right, to_left = following(cones.side), following(following(cones.side))
     below_left, above_right = _is_left(cones.left, of=apex), _is_left(apex, of=cones.right)
-    twins = mesh.twins.ravel()
-    pass_right = above_right & (twins[to_right] >= 0)
-    pass_left = below_left & (twins[to_left] >= 0)
+    pass_right = above_right & (mesh.twins[to_right] >= 0)
+    pass_left = below_left & (mesh.twins[to_left] >= 0)
     left = np.where(below_left[:, None], apex, cones.left)
     right = np.where(above_right[:, None], apex, cones.right)
     return _Cones(
         np.concatenate([cones.eye[pass_right], cones.eye[pass_left]]),
-        np.concatenate([twins[to_right[pass_right]], twins[to_left[pass_left]]]),
+        np.concatenate([mesh.twins[to_right[pass_right]], mesh.twins[to_left[pass_left]]]),
         np.concatenate([cones.right[pass_right], right[pass_left]]),
         np.concatenate([left[pass_right], cones.left[pass_left]]),
     )

@@ -24,7 +24,7 @@ from scipy.spatial import KDTree
 from oxbow.contracts import FloatArray
 from oxbow.errors import InvalidMission
 from oxbow.route.danger import NO_DANGER, Danger
-from oxbow.route.mesh import ROUNDING_M, Mesh, Touches, following
+from oxbow.route.mesh import ROUNDING_M, Mesh, Touches
 from oxbow.route.route import (
     Route,
     RouteMethod,
@@ -37,7 +37,7 @@ from oxbow.route.route import (
 )
 from oxbow.route.search import Arcs, Ways, cheapest_ways, distinct
 from oxbow.route.sights import sights
-from oxbow.route.triangulation import Indices
+from oxbow.triangles import Indices, following
 
 __all__ = ["RINGS", "TessellationRouter", "lattice"]
 
@@ -114,7 +114,7 @@ class TessellationRouter:
     """
 
     def __init__(self, mesh: Mesh, danger: Danger = NO_DANGER, *, side_m: float | None = None) -> None:
-        across_m = float(np.ptp(mesh.vertices, axis=0).max())
+        across_m = float(np.ptp(mesh.points, axis=0).max())
         least_m = across_m / MOST_SIDES_ACROSS
         if side_m is not None and not least_m <= side_m < math.inf:
             raise InvalidMission(f"is {side_m!r}; expected a finite number >= {least_m:.3g}", where="side_m")
@@ -143,7 +143,7 @@ class TessellationRouter:
     @cached_property
     def _lattice(self) -> tuple[FloatArray, Touches, Indices]:
         """The lattice in the water: its places, their triangles, and pairs that no shore parts."""
-        places, pairs = lattice(self.mesh.vertices.min(axis=0), self.mesh.vertices.max(axis=0), self.side_m)
+        places, pairs = lattice(self.mesh.points.min(axis=0), self.mesh.points.max(axis=0), self.side_m)
         touches = self.mesh.holding(places)
         wet = np.unique(touches.place)
         rank = np.full(len(places), -1)

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from oxbow.contracts import FloatArray
 from oxbow.route.danger import NO_DANGER, Danger
-from oxbow.route.mesh import Mesh, Touches, cross, following
+from oxbow.route.mesh import Mesh, Touches
 from oxbow.route.route import (
     Route,
     RouteMethod,
@@ -31,7 +31,7 @@ from oxbow.route.route import (
 )
 from oxbow.route.search import Arcs, cheapest_ways, distinct
 from oxbow.route.sights import IN_LINE, Mask, sights
-from oxbow.route.triangulation import Indices
+from oxbow.triangles import Indices, cross, following
 
 __all__ = ["VisibilityRouter"]
 

@@ -17,7 +17,8 @@ from scipy.sparse.csgraph import dijkstra
 from shapely import LineString
 
 from oxbow.errors import InvalidMission
-from oxbow.mesh import Indices, Mesh, Wavefront, propagate
+from oxbow.mesh import Mesh, Wavefront, propagate
+from oxbow.triangles import Indices
 
 __all__ = ["CellPath", "coverage_depth", "shortest_path", "watershed_path"]
 
@@ -44,11 +45,8 @@ class CellPath:
         """Over centroids and the middles of the edges between them: no step leaves its two triangles."""
         here, there = self.cells[:-1], self.cells[1:]
         side = np.argmax(self.mesh.neighbours[here] == there[:, None], axis=1)
-        corners = self.mesh.corners[here]
-        steps = np.arange(len(here))
-        gates = (corners[steps, (side + 1) % 3] + corners[steps, (side + 2) % 3]) / 2
         places = np.empty((2 * len(self.cells) - 1, 2))
-        places[::2], places[1::2] = self.mesh.centroids[self.cells], gates
+        places[::2], places[1::2] = self.mesh.centroids[self.cells], self.mesh.edge_middles[here, side]
         return LineString(places if len(places) > 1 else np.repeat(places, 2, axis=0))
 
     @property

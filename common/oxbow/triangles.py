@@ -1,0 +1,146 @@
+"""Triangles that tile an area, as arrays: how they are made, measured and numbered.
+
+A triangulation is two arrays: points, shape (n, 2), in metres, and triangles, shape (m, 3), the corners of each
+as indices into the points, counterclockwise. Side j of triangle t runs from its corner j to its corner j + 1,
+opposite its corner j + 2, and has the number 3 t + j. What two triangles share are two sides, each other's twin.
+Arguments that are called `corners` are coordinates, shape (m, 3, 2).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from oxbow.contracts import FloatArray
+
+__all__ = [
+    "Geometries",
+    "Indices",
+    "angles_rad",
+    "apexes",
+    "cross",
+    "doubled_areas",
+    "flipped",
+    "following",
+    "paired",
+    "side_lengths",
+    "triangulated",
+    "twins_of",
+]
+
+Indices = npt.NDArray[np.intp]
+Geometries = npt.NDArray[np.object_]
+
+ROUNDING = 2.0**-48
+"""A triangle lower than this share of the greatest coordinate is flat, but for rounding."""
+
+
+def triangulated(faces: BaseGeometry | Geometries) -> tuple[FloatArray, Indices]:
+    """The constrained Delaunay triangulation of polygons' own vertices (L. P. Chew 1989), by GEOS.
+
+    Parameters
+    ----------
+    faces
+        One valid region or an array of such. Where they border, they have the border's vertices in common.
+
+    Returns
+    -------
+    points : ndarray, shape (n, 2)
+    triangles : ndarray of int, shape (m, 3)
+        None has its corners in line.
+    """
+    parts = shapely.get_parts(shapely.get_parts(shapely.constrained_delaunay_triangles(faces)))
+    # GEOS goes round them clockwise.
+    corners = shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, 2::-1]
+    points, index = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
+    return points, _without_flats(points, index.reshape(-1, 3))
+
+
+def twins_of(triangles: Indices) -> Indices:
+    """Every side's twin, shape (3 m,); -1 on the border."""
+    one, other = paired(triangles.ravel(), np.roll(triangles, -1, axis=1).ravel())
+    twins = np.full(triangles.size, -1, dtype=np.intp)
+    twins[one], twins[other] = other, one
+    return twins
+
+
+def paired(tails: Indices, heads: Indices) -> tuple[Indices, Indices]:
+    """Which sides run between the same two points: indices of the one and of the other."""
+    low, high = np.minimum(tails, heads), np.maximum(tails, heads)
+    key = low * (high.max(initial=0) + 1) + high
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(key[order[1:]] == key[order[:-1]])
+    return order[same], order[same + 1]
+
+
+def following(sides: Indices) -> Indices:
+    """The next sides of the same triangles."""
+    return np.asarray(sides + np.where(sides % 3 == 2, -2, 1))
+
+
+def apexes(triangles: Indices, sides: Indices) -> Indices:
+    """The corners opposite some sides, as indices into the points."""
+    return np.asarray(triangles[sides // 3, sides % 3 - 1])
+
+
+def flipped(triangles: Indices, sides: Indices, twins: Indices) -> Indices:
+    """The triangles after some sides gave way to the other diagonal of the quadrilateral that they halve.
+
+    No two of the sides belong to one triangle.
+    """
+    (t, j), u = np.divmod(sides, 3), twins // 3
+    tail, head, apex, beyond = triangles[t, j], triangles[t, j - 2], triangles[t, j - 1], apexes(triangles, twins)
+    triangles = triangles.copy()
+    triangles[t] = np.column_stack([tail, beyond, apex])
+    triangles[u] = np.column_stack([beyond, head, apex])
+    return triangles
+
+
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """The cross product of plane vectors, over the last axis: positive where b lies to the left of a."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def doubled_areas(corners: FloatArray) -> FloatArray:
+    """Twice the area of each triangle, shape (m,), in m2; negative where it is turned over."""
+    return cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def side_lengths(corners: FloatArray) -> FloatArray:
+    """The length of each side, shape (m, 3), in metres."""
+    along = np.roll(corners, -1, axis=1) - corners
+    return np.asarray(np.hypot(along[..., 0], along[..., 1]))
+
+
+def angles_rad(corners: FloatArray) -> FloatArray:
+    """The angle at each corner, shape (m, 3)."""
+    ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    return np.asarray(np.arctan2(cross(ahead, behind), (ahead * behind).sum(axis=2)))
+
+
+def _without_flats(points: FloatArray, triangles: Indices) -> Indices:
+    """Triangles without those that have no height, which points in line make.
+
+    A flat triangle's longest side is flipped, the longest of all first: so flips do not undo one another. One with
+    a longest side on the border has no area to lose. A needle, two corners of which are one but for rounding, has
+    two such sides, and none to flip.
+    """
+    rounding_m = ROUNDING * float(np.abs(points).max(initial=0.0))
+    for _ in range(len(triangles)):
+        twins, lengths = twins_of(triangles), side_lengths(points[triangles])
+        longest = lengths.max(axis=1, keepdims=True)
+        flat = doubled_areas(points[triangles]) <= rounding_m * longest[:, 0]
+        at_border = (twins.reshape(-1, 3) < 0) & (lengths >= longest - 2 * rounding_m)
+        lost = flat & at_border.any(axis=1)
+        caps = np.flatnonzero(flat & (lengths.min(axis=1) > 2 * rounding_m))
+        if lost.any():
+            triangles = triangles[~lost]
+        elif len(caps):
+            t = caps[np.argmax(longest[caps])]
+            side = 3 * t + np.argmax(lengths[t], keepdims=True)
+            triangles = flipped(triangles, side, twins[side])
+        else:
+            break
+    return triangles

@@ -1,0 +1,73 @@
+"""Triangulations tile what they are made of, and their sides are numbered as they say."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from path_requests import lake
+from shapely import affinity
+
+from oxbow.testing import nasty_polygons
+from oxbow.triangles import (
+    angles_rad,
+    apexes,
+    cross,
+    doubled_areas,
+    flipped,
+    following,
+    side_lengths,
+    triangulated,
+    twins_of,
+)
+
+quick = settings(deadline=None, max_examples=20, derandomize=True)
+
+
+@pytest.mark.parametrize("name", sorted(nasty_polygons()))
+@pytest.mark.parametrize("turn_deg", [0.0, 17.3, 45.0])
+def test_nasty_shapes_are_tiled_by_triangles_with_a_height(name, turn_deg):
+    area = affinity.rotate(nasty_polygons()[name], turn_deg)
+    points, triangles = triangulated(shapely.segmentize(area, math.sqrt(area.area) / 4))
+    corners = points[triangles]
+    assert doubled_areas(corners).sum() / 2 == pytest.approx(area.area)
+    assert (doubled_areas(corners) > 1e-14 * side_lengths(corners).max(axis=1)).all()
+    assert side_lengths(corners).ravel()[twins_of(triangles) < 0].sum() == pytest.approx(area.length)
+
+
+@quick
+@given(seed=st.integers(0, 10_000))
+def test_twins_are_one_side_seen_from_both_its_triangles(seed):
+    _, triangles = triangulated(lake(seed, vertices=60))
+    twins = twins_of(triangles)
+    inner = np.flatnonzero(twins >= 0)
+    tails, heads = triangles.ravel(), triangles.ravel()[following(np.arange(triangles.size))]
+    assert (twins[twins[inner]] == inner).all()
+    assert (tails[twins[inner]] == heads[inner]).all()
+    around = np.column_stack([tails, heads, apexes(triangles, np.arange(triangles.size))])
+    assert (np.sort(around) == np.sort(triangles).repeat(3, axis=0)).all()
+
+
+@quick
+@given(seed=st.integers(0, 10_000), choice=st.integers(0, 10**6))
+def test_a_flip_exchanges_the_diagonals_of_a_quadrilateral(seed, choice):
+    points, triangles = triangulated(lake(seed, vertices=60))
+    twins = twins_of(triangles)
+    inner = np.flatnonzero(twins >= 0)
+    side = inner[[choice % len(inner)]]
+    other = flipped(triangles, side, twins[side])
+    changed = np.flatnonzero((other != triangles).any(axis=1))
+    assert set(changed) == {int(side[0]) // 3, int(twins[side[0]]) // 3}
+    ends = {*apexes(triangles, side).tolist(), *apexes(triangles, twins[side]).tolist()}
+    assert set(other[changed[0]]) & set(other[changed[1]]) == ends
+    assert doubled_areas(points[other]).sum() == pytest.approx(doubled_areas(points[triangles]).sum())
+
+
+def test_a_triangle_is_measured_by_hand():
+    corners = np.array([[(0.0, 0.0), (4.0, 0.0), (0.0, 3.0)]])
+    assert doubled_areas(corners).tolist() == [12.0]
+    assert side_lengths(corners).tolist() == [[4.0, 5.0, 3.0]]
+    assert angles_rad(corners)[0] == pytest.approx([math.pi / 2, math.atan(3 / 4), math.atan(4 / 3)])
+    assert cross(np.array([1.0, 0.0]), np.array([0.0, 2.0])) == 2.0
