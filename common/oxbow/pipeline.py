@@ -127,6 +127,8 @@ def treatment(task: Task) -> TeamPlan:
             vehicles=tuple(member.vehicle for member in team.values()),
             hot_spots=task.site.hot_spots,
             swath_m=task.mission.treated_swath_m,
+            danger_zones=task.site.danger_zones,
+            danger_detour_m=task.site.danger_detour_m,
             seed=task.options.seed,
         ),
     )
@@ -227,6 +229,7 @@ def _certified(task: Task, vehicles: Sequence[VehiclePlan], areas: tuple[Polygon
             safety_m=task.mission.safety_m,
             variogram=task.mission.variogram,
             areas=areas,
+            danger_zones=task.site.danger_zones,
         ),
     )
 

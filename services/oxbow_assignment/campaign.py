@@ -10,7 +10,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import HotSpot, LeftSpot, Vehicle
-from oxbow.route import RouteMethod, make_router
+from oxbow.route import NO_DANGER, Danger, RouteMethod, make_router
 from oxbow_assignment.division import Division, divided
 from oxbow_assignment.fleet import Fleet
 from oxbow_assignment.sorties import Journey, Schedule, scheduled
@@ -76,7 +76,13 @@ def _swaths(journeys: Sequence[Journey], water: BaseGeometry, swath_m: float) ->
 
 
 def plan_campaign(
-    spots: Sequence[HotSpot], slaves: Sequence[Vehicle], free: Polygon, swath_m: float, *, seed: int = 0
+    spots: Sequence[HotSpot],
+    slaves: Sequence[Vehicle],
+    free: Polygon,
+    swath_m: float,
+    *,
+    danger: Danger = NO_DANGER,
+    seed: int = 0,
 ) -> Campaign:
     """Plan the treatment of hot spots (Rendas and Li 2016, section 1.3).
 
@@ -90,6 +96,8 @@ def plan_campaign(
         Where they may go.
     swath_m
         The width that one pass treats.
+    danger
+        What routes to, between and from hot spots avoid; passes over a hot spot do not.
     seed
         Where clustering starts.
 
@@ -102,7 +110,7 @@ def plan_campaign(
     """
     require_treatable(spots)
     shapely.prepare(free)
-    fleet = Fleet.of(slaves, free, make_router(RouteMethod.VISIBILITY, free))
+    fleet = Fleet.of(slaves, free, danger)
     found = tuple(waters(spots, free))
     # From pass to pass there is next to nothing to choose: the funnel's way is the shortest, and found at once.
     between_passes = make_router(RouteMethod.FUNNEL, free)
@@ -138,6 +146,7 @@ def _dry(spots: Sequence[HotSpot], found: Sequence[BaseGeometry], free: Polygon)
 
 def _out_of_reach(treatments: Sequence[Treatment], division: Division, fleet: Fleet) -> list[LeftSpot]:
     """One entry for each hot spot with stretches that no sortie reaches."""
+    counted = ", what danger is worth included" if fleet.danger.zones else ""
     left = []
     for number, treatment in enumerate(treatments):
         own = [stretch for stretch in division.out_of_reach if stretch.part.treatment == number]
@@ -149,8 +158,8 @@ def _out_of_reach(treatments: Sequence[Treatment], division: Division, fleet: Fl
         length_m = treatment.line.length
         reason = (
             f"{share:.0%} of its {length_m:.0f} m of passes are out of reach: {slave.name!r} would travel"
-            f" {nearest.access_m:.0f} m there and home, beside {nearest.part.line.length:.0f} m of passes, and may"
-            f" travel {slave.length_m:.0f} m"
+            f" {nearest.access_m:.0f} m there and home{counted}, beside {nearest.part.line.length:.0f} m of"
+            f" passes, and may travel {slave.length_m:.0f} m"
         )
         value_per_m = share * treatment.spot.value / (nearest.access_m + share * length_m)
         left.append(LeftSpot(hot_spot=treatment.spot.name, value_per_m=value_per_m, reason=reason))

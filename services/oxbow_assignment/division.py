@@ -81,6 +81,7 @@ def divided(treatments: Sequence[Treatment], fleet: Fleet) -> Division:
     A part fits where its length and the way to it and home do, either way round on average. One that does not fit
     is divided evenly into as many as its distance asks for, and so on. On a line the way there and home changes by
     no more than twice what is travelled: where even that leaves nothing within reach, nothing is divided further.
+    Danger changes that way by more, where a zone begins or ends: there, short stretches are tried as well.
 
     Raises
     ------
@@ -98,9 +99,10 @@ def divided(treatments: Sequence[Treatment], fleet: Fleet) -> Division:
         longer: list[Part] = []
         for piece, length_m, own in zip(pieces, ways.lengths_m.tolist(), spare.T, strict=True):
             slave = int(own.argmax())
+            is_far = own[slave] + length_m < 0.0 and not fleet.danger.zones
             if length_m <= own[slave]:
                 parts.append(piece)
-            elif own[slave] + length_m < 0.0 or length_m <= LEAST_PART * fleet.lengths_m[slave]:
+            elif is_far or length_m <= LEAST_PART * fleet.lengths_m[slave]:
                 access_m = float(fleet.lengths_m[slave] - own[slave])
                 out_of_reach.append(OutOfReach(piece, slave, access_m))
             else:

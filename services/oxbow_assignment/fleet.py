@@ -1,9 +1,15 @@
-"""The slaves at sea: where each enters and leaves the free space, and how far treatments lie from there."""
+"""The slaves at sea: where each enters and leaves the free space, and how far treatments lie from there.
+
+Where there are danger zones, metres are costs: what danger on the way is worth counts as so many metres, against a
+range too (M. Innocenti, L. Pollini and A. Bracci 2006, section 3). Costs are never less than lengths, whichever of
+several equally cheap routes is taken, so that a sortie within its costs is within its range. A route that starts
+in a zone counts it, and so does the route that led there.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +19,7 @@ from shapely import LineString, Point, Polygon
 
 from oxbow.contracts import FloatArray, Vehicle
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.route import Router
+from oxbow.route import NO_DANGER, Danger, RouteMethod, Router, make_router
 
 __all__ = ["Fleet", "Ways"]
 
@@ -23,7 +29,7 @@ MARGIN = 1e-9
 
 @dataclass(frozen=True)
 class Ways:
-    """Metres along the shortest routes from and to the ends of n lines.
+    """Metres along the best routes from and to the ends of n lines.
 
     Parameters
     ----------
@@ -56,8 +62,12 @@ class Fleet:
         At least one.
     free
         Where they may go; prepared.
+    danger
+        What is to be avoided there.
+    routers
+        Each slave's own, with its `a`, for its ways from its start and to its recovery.
     router
-        Finds the shortest routes through it.
+        Of the ways between treatments, with an `a` of 1: the report sets it between vehicles and targets alone.
     out, home
         A leg for each slave: from its start straight to the nearest place of the free space, and from there to its
         recovery; of no length where the point lies in the free space.
@@ -65,13 +75,15 @@ class Fleet:
 
     slaves: tuple[Vehicle, ...]
     free: Polygon
+    danger: Danger
+    routers: tuple[Router, ...]
     router: Router
     out: tuple[LineString, ...]
     home: tuple[LineString, ...]
 
     @classmethod
-    def of(cls, slaves: Sequence[Vehicle], free: Polygon, router: Router) -> Fleet:
-        """The slaves and their legs.
+    def of(cls, slaves: Sequence[Vehicle], free: Polygon, danger: Danger = NO_DANGER) -> Fleet:
+        """The slaves, their legs and their routers.
 
         Raises
         ------
@@ -91,7 +103,13 @@ class Fleet:
                     f" expected less than the vehicle's {slave.length_m:.0f} m in all",
                     where=f"vehicle {slave.name!r}: start",
                 )
-        return cls(tuple(slaves), free, router, out, home)
+        factors = [slave.danger_factor if danger.zones else 1.0 for slave in slaves]
+        routers = {
+            factor: make_router(RouteMethod.VISIBILITY, free, replace(danger, a=factor))
+            for factor in {1.0, *factors}
+        }
+        own = tuple(routers[factor] for factor in factors)
+        return cls(tuple(slaves), free, danger, own, routers[1.0], out, home)
 
     @cached_property
     def cautious_slaves(self) -> tuple[Vehicle, ...]:
@@ -113,9 +131,11 @@ class Fleet:
         ends = np.array([line.coords[end] for line in lines for end in (0, -1)])
         docks = np.array([leg.coords[-1] for leg in self.out] + [leg.coords[0] for leg in self.home])
         places, row = np.unique(np.vstack([ends, docks]), axis=0, return_inverse=True)
-        metres = self.router.distances(places)[np.ix_(row, row)]
+        metres = {router: router.distances(places)[np.ix_(row, row)] for router in {self.router, *self.routers}}
         count, boats = len(lines), len(self.slaves)
-        from_docks = metres[2 * count :, : 2 * count] + self._legs_m[:, None]
-        from_docks = from_docks.reshape(2, boats, count, 2)
-        between = metres[: 2 * count, : 2 * count].reshape(count, 2, count, 2).transpose(0, 2, 1, 3)
+        from_docks = np.array(
+            [metres[router][2 * count + k, : 2 * count] for k, router in enumerate(2 * self.routers)]
+        )
+        from_docks = (from_docks + self._legs_m[:, None]).reshape(2, boats, count, 2)
+        between = metres[self.router][: 2 * count, : 2 * count].reshape(count, 2, count, 2).transpose(0, 2, 1, 3)
         return Ways(from_docks[0], from_docks[1], between, shapely.length(np.asarray(lines)))

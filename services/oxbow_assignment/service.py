@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from oxbow.contracts import Assignment, AssignRequest, Role, Share, Sortie, Vehicle
 from oxbow.recording import Show
+from oxbow.route import Danger
 from oxbow_assignment.campaign import Campaign, plan_campaign
 from oxbow_assignment.sharing import shared
 from oxbow_assignment.show import show_campaign, show_partition, show_shares
@@ -31,7 +32,10 @@ def handle(request: AssignRequest, show: Show) -> Assignment:
 
     # 2. Passes over every hot spot, in parts that fit, shared among the slaves, round after round.
     slaves = _with_role(request.vehicles, Role.SLAVE)
-    campaign = plan_campaign(request.hot_spots, slaves, request.free, request.swath_m, seed=request.seed)
+    danger = Danger(request.danger_zones, request.danger_detour_m)
+    campaign = plan_campaign(
+        request.hot_spots, slaves, request.free, request.swath_m, danger=danger, seed=request.seed
+    )
     first, *others = campaign.schedule.rounds or ((),)
 
     # 3. What has been planned, measured and shown.

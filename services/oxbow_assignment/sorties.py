@@ -128,7 +128,12 @@ def _journey(slave: int, tour: IntArray, parts: Sequence[Part], fleet: Fleet, wa
         for number, backwards in zip(tour.tolist(), _turns(slave, tour, ways), strict=True)
     ]
     stops = [fleet.out[slave], *lines, fleet.home[slave]]
-    routes = [fleet.router.route(before.coords[-1], after.coords[0]).line for before, after in pairwise(stops)]
+    own = fleet.routers[slave]
+    routers = [own, *[fleet.router] * (len(lines) - 1), own]
+    routes = [
+        router.route(before.coords[-1], after.coords[0]).line
+        for router, (before, after) in zip(routers, pairwise(stops), strict=True)
+    ]
     travelled = [stops[0], *(line for pair in zip(routes, stops[1:], strict=True) for line in pair)]
     path = joined(travelled)
     _require_conforming(path, fleet, slave)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import shapely
 from shapely import MultiLineString
 
 from oxbow.contracts import Certificate, CertifyRequest, Conformance, Track
+from oxbow.route import Danger
 from oxbow_certificate.axes import Paths
 from oxbow_certificate.conformance import about_ends, count_crossings, outside_length, unsafe_length
 from oxbow_certificate.cover import CoverRadius, cover_radius, least_radius
@@ -58,7 +60,8 @@ def judge(request: CertifyRequest) -> Judgement:
     cover = cover_radius(space.judged, distance)
     spread = distance_spread(space.judged, distance)
     least_m = least_radius(space.judged.area, paths.length, len(lines))
-    tracks = tuple(_conformance(track, space, request.safety_m) for track in request.tracks)
+    danger = Danger(request.danger_zones)
+    tracks = tuple(_conformance(track, space, request.safety_m, danger) for track in request.tracks)
     certificate = Certificate(
         **_together(tracks),
         **_water(space),
@@ -70,7 +73,7 @@ def judge(request: CertifyRequest) -> Judgement:
     return Judgement(certificate, paths, space, cover, spread)
 
 
-def _conformance(track: Track, space: JudgedSpace, safety_m: float) -> Conformance:
+def _conformance(track: Track, space: JudgedSpace, safety_m: float, danger: Danger) -> Conformance:
     path = track.path
     crossings = count_crossings(path)
     return Conformance(
@@ -81,17 +84,26 @@ def _conformance(track: Track, space: JudgedSpace, safety_m: float) -> Conforman
         crossings=crossings,
         outside_m=outside_length(path, space),
         unsafe_m=unsafe_length(path, space, safety_m, (track.launch, track.recovery)),
+        danger=danger.probability(shapely.get_coordinates(path)) if danger.zones else None,
     )
 
 
 def _together(tracks: tuple[Conformance, ...]) -> dict[str, Any]:
-    """Sums of what is counted and measured along the paths; the mission lasts as long as its longest."""
+    """Sums of what is counted and measured along the paths; the mission lasts as long as its longest.
+
+    Any of them may come to harm, each on its own: the probabilities of no harm multiply.
+    """
     sums = {
         name: sum(getattr(track, name) for track in tracks)
         for name in ("length_m", "waypoints", "crossings", "outside_m", "unsafe_m")
     }
     duration_s = max(track.duration_s for track in tracks)
-    return sums | {"duration_s": duration_s, "is_simple": all(track.is_simple for track in tracks)}
+    dangers = [track.danger for track in tracks if track.danger is not None]
+    return sums | {
+        "duration_s": duration_s,
+        "is_simple": all(track.is_simple for track in tracks),
+        "danger": float(1.0 - np.prod(1.0 - np.array(dangers))) if dangers else None,
+    }
 
 
 def _water(space: JudgedSpace) -> dict[str, Any]:

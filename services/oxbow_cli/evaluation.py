@@ -149,6 +149,7 @@ def _request(mission: Mission, site: Site, paths: list[_Path]) -> CertifyRequest
         safety_m=mission.safety_m,
         variogram=mission.variogram,
         areas=tuple(spot.area for spot in site.hot_spots) if treats else (),
+        danger_zones=site.danger_zones,
     )
 
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon, affinity, box
 
-from oxbow.contracts import Certificate, CertifyRequest, Track
+from oxbow.contracts import Certificate, CertifyRequest, DangerZone, Per, Track
 from oxbow.errors import Infeasible
 from oxbow.mission import mission_json, read_mission
 from oxbow.pipeline import plan_mission
@@ -53,6 +53,17 @@ def test_a_circle_in_an_annulus():
     judged = certified(middle, Point(0, 0).buffer(100, quad_segs=64), zones=(island,))
     assert judged.cover_radius_m[0] == pytest.approx(25, rel=0.01)
     assert judged.free_area_m2 == pytest.approx(math.pi * 7500, rel=0.01)
+
+
+def test_danger_is_one_less_the_chances_of_no_harm():
+    lane = DangerZone(name="lane", area=box(40, -5, 60, 105), probability=0.3)
+    shallows = DangerZone(name="shallows", area=box(50, 40, 90, 60), probability=0.01, per=Per.METRE)
+    zones = {"danger_zones": (lane, shallows)}
+    there_and_back = [(0, 30), (100, 30), (100, 50), (0, 50)]
+    assert certified(there_and_back, **zones).danger == pytest.approx(1 - 0.7**2 * 0.99**40, abs=1e-6)
+    assert certified([(50, 10), (55, 20), (45, 30)], **zones).danger == pytest.approx(0.3), "it starts inside"
+    assert certified([(0, 10), (40, 10), (40, 90)], **zones).danger == 0.0, "along the outline"
+    assert certified(there_and_back).danger is None
 
 
 def test_the_least_radius_solves_its_equation():

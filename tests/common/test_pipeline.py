@@ -3,6 +3,7 @@
 import json
 from itertools import pairwise
 
+import msgspec
 import pytest
 import shapely
 from shapely import LineString
@@ -233,3 +234,26 @@ def test_progress_never_runs_backwards():
     plan_here(job)
     assert all(before < after for (_, before), (_, after) in pairwise(heard))
     assert heard[-1][1] < 1.0
+
+
+def test_danger_zones_are_gone_round_and_the_danger_is_told():
+    """The straight way to the east leads through a ferry's lane, which ends 40 m from the northern shore."""
+    pond, launch = contour((0, 0), (800, 0), (800, 300), (0, 300)), at(10, 150)
+    east = {"type": "FeatureCollection", "features": [spot(700, 140, 30, 40.0)]}
+    lane = {"Name": "ferry", "Danger": 0.2, "Contour": contour((300, -5), (340, -5), (340, 260), (300, 260))}
+    changes = {"BoundingBox": pond, "LaunchPoint": launch, "ForbiddenZones": [], "DangerZones": [lane]}
+    given = mission("map&treat", prior=east, **changes)
+    careful, _ = planned(given)
+    careless, _ = planned(msgspec.structs.replace(given, danger_detour_m=0.0))
+    around, through = lines(careful)["slave"], lines(careless)["slave"]
+    assert careful.plan.slave_certificate.danger == 0.0
+    assert careless.plan.slave_certificate.danger == pytest.approx(1.0 - 0.8**2)
+    assert through.length < around.length
+    assert careful.plan.certificate.danger > 0.3, "surveys cover the lane"
+    judged = evaluate(careless)
+    assert [vehicle.danger for vehicle in judged.vehicles] == pytest.approx(
+        [careless.plan.certificate.danger, 1.0 - 0.8**2]
+    )
+    plain, _ = planned(msgspec.structs.replace(given, danger_zones=None))
+    assert (plain.slave_path, plain.master_path) == (careless.slave_path, careless.master_path)
+    assert plain.plan.certificate.danger is evaluate(plain).danger is None

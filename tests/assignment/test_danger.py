@@ -1,0 +1,136 @@
+"""Danger zones in treatments: gone round where that is worth it, and told by the certificate."""
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from path_requests import lake
+from shapely import Polygon, box
+from waters import blob, hot_spots, require_sound, slave
+
+from oxbow.codec import encode
+from oxbow.contracts import (
+    Assignment,
+    AssignRequest,
+    CertifyRequest,
+    Conformance,
+    DangerZone,
+    HotSpot,
+    Per,
+    Sortie,
+)
+from oxbow.errors import Infeasible
+from oxbow.recording import discard
+from oxbow_assignment.service import handle
+from oxbow_certificate.certify import certify
+
+quick = settings(deadline=None, max_examples=10, derandomize=True)
+replaced = msgspec.structs.replace
+
+POND = box(0, 0, 1_000, 600)
+START = (0.0, 300.0)
+REEF = box(400, 100, 500, 610)
+"""It reaches the northern shore; the way round its southern end is 133 m longer."""
+BAR = box(400, -10, 500, 610)
+"""No way leads round it."""
+SPOT = HotSpot(name="bloom", area=box(700, 295, 760, 305), value=1.0)
+REQUEST = AssignRequest(free=POND, vehicles=(slave(START, length_m=4_000.0),), hot_spots=(SPOT,), swath_m=10.0)
+
+
+def zone(area: Polygon = REEF, probability: float = 0.5, per: Per = Per.CROSSING) -> DangerZone:
+    return DangerZone(name="reef", area=area, probability=probability, per=per)
+
+
+def reply(*zones: DangerZone, **changes) -> Assignment:
+    return handle(replaced(REQUEST, danger_zones=zones, **changes), discard)
+
+
+def judged(sortie: Sortie, *zones: DangerZone, others: tuple[Sortie, ...] = ()) -> Conformance:
+    tracks = [{"path": each.path, "launch": START, "recovery": START} for each in (sortie, *others)]
+    request = CertifyRequest(outline=POND, danger_zones=zones, **tracks[0])
+    return certify(replaced(request, others=tuple(replaced(request, **track) for track in tracks[1:])))
+
+
+@pytest.mark.parametrize(("detour_m", "crossings"), [(1_000.0, 0), (150.0, 2), (0.0, 2)])
+def test_the_route_between_goes_round_where_that_is_worth_it(detour_m, crossings):
+    (sortie,) = reply(zone(), danger_detour_m=detour_m).sorties
+    plain = reply().sorties[0].length_m
+    assert sortie.path.crosses(REEF) is bool(crossings)
+    assert judged(sortie, zone()).danger == pytest.approx(1.0 - 0.5**crossings)
+    assert sortie.length_m == pytest.approx(plain if crossings else plain + 2 * 133.5, abs=25.0)
+
+
+def test_the_danger_of_metres_is_told():
+    bar = zone(BAR, 0.001, Per.METRE)
+    (sortie,) = reply(bar).sorties
+    assert judged(sortie, bar).danger == pytest.approx(1.0 - 0.999 ** (2 * 100), abs=1e-4)
+
+
+def test_any_of_several_vehicles_may_come_to_harm():
+    (sortie,) = reply(zone(BAR, 0.2)).sorties
+    both = judged(sortie, zone(BAR, 0.2), others=(sortie,))
+    assert [track.danger for track in both.tracks] == pytest.approx([1.0 - 0.8**2] * 2)
+    assert both.danger == pytest.approx(1.0 - 0.8**4)
+    assert judged(sortie).danger is None
+    assert judged(sortie, zone(box(5, 550, 10, 600))).danger == 0.0
+
+
+def test_danger_counts_against_a_range():
+    (left,) = reply(zone(BAR, 0.9)).left
+    assert left.hot_spot == "bloom"
+    assert "m there and home, what danger is worth included" in left.reason
+    careless = reply(zone(BAR, 0.9), danger_detour_m=0.0)
+    assert (careless.left, len(careless.sorties)) == ((), 1)
+
+
+def test_who_is_less_fit_is_sent_less():
+    far = zone(box(0, 0, 10, 10))
+    for fit, unfit in (("one", "two"), ("two", "one")):
+        fleet = tuple(
+            replaced(slave(START, name=name, length_m=4_000.0), danger_factor=3.0 if name == unfit else 1.0)
+            for name in ("one", "two")
+        )
+        assert [sortie.vehicle for sortie in reply(far, vehicles=fleet).sorties] == [fit]
+
+
+def test_without_zones_nothing_changes():
+    free, rng = lake(5), np.random.default_rng(5)
+    fleet = tuple(slave((0.0, 0.0), name=name, length_m=6_000.0) for name in "ab")
+    request = AssignRequest(free=free, vehicles=fleet, hot_spots=hot_spots(rng, free, 6, 150.0), swath_m=30.0)
+    less_fit = tuple(replaced(vehicle, danger_factor=9.0) for vehicle in fleet)
+    other = replaced(request, vehicles=less_fit, danger_detour_m=7.0)
+    assert encode(handle(other, discard)) == encode(handle(request, discard))
+
+
+@quick
+@given(seed=st.integers(0, 10_000), factor=st.sampled_from([1.0, 1.05]), detour_m=st.sampled_from([50.0, 2_000.0]))
+def test_sorties_among_danger_zones_are_sound(seed, factor, detour_m):
+    free, rng = lake(seed), np.random.default_rng(seed)
+    x0, y0, x1, y1 = free.bounds
+    places = rng.uniform((x0, y0), (x1, y1), (4, 2)).tolist()
+    fleet = tuple(
+        replaced(
+            slave(tuple(places[k]), name=f"{k}", length_m=8_000.0, recovery=tuple(places[k + 2])),
+            danger_factor=factor**k,
+        )
+        for k in range(2)
+    )
+    zones = tuple(
+        DangerZone(name=f"{per}", area=blob(rng, free, 300.0).buffer(0.0), probability=probability, per=per)
+        for per, probability in ((Per.CROSSING, 0.3), (Per.METRE, 1e-3))
+    )
+    request = AssignRequest(
+        free=free,
+        vehicles=fleet,
+        hot_spots=hot_spots(rng, free, 5, 150.0),
+        swath_m=40.0,
+        danger_zones=zones,
+        danger_detour_m=detour_m,
+    )
+    try:
+        found = handle(request, discard)
+    except Infeasible as error:
+        assert "outside the free space" in str(error)
+        return
+    require_sound(request, found)
