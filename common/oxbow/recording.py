@@ -11,7 +11,7 @@ from collections.abc import Callable
 import msgspec
 from shapely.geometry.base import BaseGeometry
 
-__all__ = ["Colour", "Layer", "LayerKind", "Show", "Stamped", "discard"]
+__all__ = ["Colour", "Layer", "LayerKind", "Show", "Stamped", "discard", "is_watched"]
 
 Colour = tuple[int, int, int]
 
@@ -102,3 +102,8 @@ Show = Callable[[Layer], None]
 
 def discard(layer: Layer) -> None:
     """Show nothing: for a caller that keeps no recording."""
+
+
+def is_watched(show: Show) -> bool:
+    """Whether anybody looks: what is computed for a layer alone may be left out where nobody does."""
+    return show is not discard

@@ -1,18 +1,22 @@
-"""What the stage shows: the mesh and its shares, hot spots, clusters, passes and sorties."""
+"""What the stage shows: the mesh and its shares, hot spots, danger zones, clusters, passes, routes and sorties."""
 
 from __future__ import annotations
 
 import numpy as np
 from shapely import LineString
 
-from oxbow.contracts import HotSpot, Share, Sortie
-from oxbow.recording import Layer, LayerKind, Show
+from oxbow.contracts import DangerZone, HotSpot, Share, Sortie
+from oxbow.recording import Layer, LayerKind, Show, is_watched
+from oxbow.route import Route, RouteMethod, make_router
 from oxbow_assignment.campaign import Campaign
 from oxbow_assignment.partition import Partition
 
 __all__ = ["show_campaign", "show_partition", "show_shares"]
 
 STAGE = "assignment"
+
+MOST_LEGS = 20
+"""So many legs are shown by every method, lest those who look wait for it."""
 
 
 def show_partition(partition: Partition, show: Show) -> None:
@@ -38,9 +42,11 @@ def show_campaign(
     further: tuple[Sortie, ...],
     show: Show,
 ) -> None:
-    """Hot spots, their passes, the clusters of the first round, the routes between, and all sorties."""
+    """Hot spots, danger zones, passes, the clusters of the first round, the routes between, and all sorties."""
     labels = tuple(f"{spot.name}: {spot.value:g}" for spot in spots)
     show(Layer(stage=STAGE, name="hot_spots", geometries=tuple(spot.area for spot in spots), labels=labels))
+    if campaign.fleet.danger.zones:
+        show(_danger_zones(campaign.fleet.danger.zones))
     passes = tuple(line for treatment in campaign.treatments for line in treatment.passes)
     show(Layer(stage=STAGE, name="passes", geometries=passes))
     show(_clusters(campaign))
@@ -48,11 +54,47 @@ def show_campaign(
         route for journeys in campaign.schedule.rounds for journey in journeys for route in journey.routes
     )
     show(Layer(stage=STAGE, name="routes", geometries=routes))
+    if is_watched(show):
+        _show_routes_of_every_method(campaign, show)
     for name, group in (("sorties", sorties), ("further", further)):
         labels = tuple(f"{sortie.vehicle}: {', '.join(sortie.hot_spots)}" for sortie in group)
         show(Layer(stage=STAGE, name=name, geometries=tuple(sortie.path for sortie in group), labels=labels))
     lengths = {sortie.vehicle: sortie.length_m for sortie in sorties}
     show(Layer(stage=STAGE, name="figures", kind=LayerKind.SCALARS, scalars=lengths))
+
+
+def _danger_zones(zones: tuple[DangerZone, ...]) -> Layer:
+    """Every danger zone, coloured by its danger."""
+    return Layer(
+        stage=STAGE,
+        name="danger_zones",
+        geometries=tuple(zone.area for zone in zones),
+        labels=tuple(f"{zone.name}: danger {zone.probability:g} a {zone.per}" for zone in zones),
+        values=tuple(zone.probability for zone in zones),
+    )
+
+
+def _show_routes_of_every_method(campaign: Campaign, show: Show) -> None:
+    """The first sorties' routes as every method finds them, side by side."""
+    fleet = campaign.fleet
+    journeys = campaign.schedule.rounds[0] if campaign.schedule.rounds else ()
+    legs = [route for journey in journeys for route in journey.routes if route.length > 0.0][:MOST_LEGS]
+    for method in RouteMethod:
+        router = make_router(method, fleet.free, fleet.danger)
+        routes = [router.route(leg.coords[0], leg.coords[-1]) for leg in legs]
+        show(
+            Layer(
+                stage=STAGE,
+                name=f"routes_{method}",
+                geometries=tuple(route.line for route in routes),
+                labels=tuple(_label(route) for route in routes),
+            )
+        )
+
+
+def _label(route: Route) -> str:
+    danger = f", danger {route.danger:.1%}" if route.danger > 0.0 else ""
+    return f"{route.length_m:.0f} m, {route.clearance_m:.1f} m from the shore{danger}"
 
 
 def _clusters(campaign: Campaign) -> Layer:

@@ -21,7 +21,8 @@ from oxbow.contracts import (
     Sortie,
 )
 from oxbow.errors import Infeasible
-from oxbow.recording import discard
+from oxbow.recording import Layer, discard
+from oxbow.route import RouteMethod
 from oxbow_assignment.service import handle
 from oxbow_certificate.certify import certify
 
@@ -101,6 +102,24 @@ def test_without_zones_nothing_changes():
     less_fit = tuple(replaced(vehicle, danger_factor=9.0) for vehicle in fleet)
     other = replaced(request, vehicles=less_fit, danger_detour_m=7.0)
     assert encode(handle(other, discard)) == encode(handle(request, discard))
+
+
+def test_zones_and_the_routes_of_every_method_are_shown():
+    layers: list[Layer] = []
+    request = replaced(REQUEST, danger_zones=(zone(),))
+    (sortie,) = handle(request, layers.append).sorties
+    shown = {layer.name: layer for layer in layers}
+    assert shown["danger_zones"].labels == ("reef: danger 0.5 a crossing",)
+    assert shown["danger_zones"].values == (0.5,)
+    routes = {method: shown[f"routes_{method}"] for method in RouteMethod}
+    for layer in routes.values():
+        assert [leg.coords[0] for leg in layer.geometries] == [leg.coords[0] for leg in shown["routes"].geometries]
+        assert all(not leg.crosses(REEF) for leg in layer.geometries)
+        assert all(" m from the shore" in label for label in layer.labels)
+    assert routes[RouteMethod.VISIBILITY].geometries == shown["routes"].geometries
+    lengths_m = [sum(leg.length for leg in layer.geometries) for layer in routes.values()]
+    assert min(lengths_m) == lengths_m[0]
+    assert handle(request, discard).sorties == (sortie,)
 
 
 @quick

@@ -16,6 +16,7 @@ from oxbow.contracts import Assignment, AssignRequest, ContourRequest, HotSpot
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.mission import read_mission
 from oxbow.recording import Layer, discard
+from oxbow.route import RouteMethod
 from oxbow.site import Site
 from oxbow.testing import nasty_polygons
 from oxbow_assignment.partition import BALANCE
@@ -299,7 +300,9 @@ def test_every_step_is_shown():
     assert {layer.stage for layer in layers} == {"assignment"}
     shown = {layer.name: layer for layer in layers}
     shares = ["mesh", "wavefront", "shares"]
-    assert list(shown) == [*shares, "hot_spots", "passes", "clusters", "routes", "sorties", "further", "figures"]
+    methods = [f"routes_{method}" for method in RouteMethod]
+    sorties = ["sorties", "further", "figures"]
+    assert list(shown) == [*shares, "hot_spots", "passes", "clusters", "routes", *methods, *sorties]
     assert shown["hot_spots"].labels == ("north: 2", "south: 1", "east: 3")
     assert max(shown["wavefront"].values) == 1.0
     assert len(shown["clusters"].geometries) == 3
