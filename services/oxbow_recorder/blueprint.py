@@ -8,105 +8,87 @@ __all__ = ["blueprint"]
 
 
 def blueprint() -> rrb.Blueprint:
-    """The arrangement that every recording carries."""
+    """The arrangement that every recording carries; it opens on the finished plan."""
     return rrb.Blueprint(
         rrb.Tabs(
             _path(),
             rrb.Spatial2DView(origin="contour", name="Contour"),
             _assignment(),
             _decomposition(),
-            _certificate(),
+            _plane("Certificate", "contour/raw", "certificate"),
             rrb.MapView(origin="map", name="Map"),
             _log(),
             active_tab=0,
         ),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline="time", play_state="following"),
     )
 
 
 def _path() -> rrb.Horizontal:
-    return rrb.Horizontal(
-        rrb.Spatial2DView(
-            origin="/",
-            name="Path, and the tree that it began with",
-            contents=[
-                "contour/eroded/**",
-                "path/transects/**",
-                "path/circuit/**",
-                "path/cuts/**",
-                "path/contours/**",
-                "path/links/**",
-                "path/sites/**",
-                "path/path/**",
-            ],
+    return _beside(
+        "Path",
+        _plane(
+            "Paths, and the tree that the last began with",
+            "contour/eroded",
+            "assignment/shares",
+            "assignment/hot_spots",
+            "path/transects",
+            "path/circuit",
+            "path/cuts",
+            "path/contours",
+            "path/links",
+            "path/sites",
+            "path/path",
+            "certificate/path",
         ),
-        rrb.Vertical(
-            rrb.Spatial2DView(
-                origin="/",
-                name="Step by step: spacing loop or ring, then the refinement",
-                contents=["contour/eroded/**", "path/iterations/**", "path/ring/**", "path/refined/**"],
-            ),
-            rrb.TimeSeriesView(
-                origin="path",
-                name="Length, spacing, distances per step",
-                contents=["$origin/loop/**", "$origin/epochs/**", "$origin/refinement/**"],
-            ),
-            row_shares=[3, 1],
+        _plane(
+            "Step by step: spacing loop or ring, then the refinement",
+            "contour/eroded",
+            "path/iterations",
+            "path/ring",
+            "path/refined",
         ),
-        column_shares=[3, 2],
-        name="Path",
-    )
-
-
-def _decomposition() -> rrb.Horizontal:
-    return rrb.Horizontal(
-        rrb.Spatial2DView(
-            origin="decomposition",
-            name="Cells and critical points",
-            contents=["$origin/cells/**", "$origin/critical_points/**"],
+        _plot("Length, m", "path/loop/length_m", "path/epochs/length_m", "path/refinement/length_m"),
+        _plot(
+            "Spacing and distances to the path, m",
+            "path/loop/spacing_m",
+            "path/refinement/largest_distance_m",
+            "path/refinement/p95_distance_m",
         ),
-        rrb.Vertical(
-            rrb.GraphView(origin="decomposition/reeb", name="Reeb graph"),
-            rrb.TimeSeriesView(origin="decomposition/scores", name="Predicted cost of each heading"),
-            row_shares=[3, 1],
-        ),
-        column_shares=[3, 2],
-        name="Decomposition",
     )
 
 
 def _assignment() -> rrb.Horizontal:
     return rrb.Horizontal(
-        rrb.Spatial2DView(
-            origin="/",
-            name="Shares, and the mesh that they are made of",
-            contents=[
-                "contour/eroded/**",
-                "assignment/mesh/**",
-                "assignment/wavefront/**",
-                "assignment/shares/**",
-            ],
+        _plane(
+            "Shares, and the mesh that they are made of",
+            "contour/eroded",
+            "assignment/mesh",
+            "assignment/wavefront",
+            "assignment/shares",
         ),
-        rrb.Spatial2DView(
-            origin="/",
-            name="Hot spots, passes and sorties",
-            contents=[
-                "contour/eroded/**",
-                "assignment/hot_spots/**",
-                "assignment/passes/**",
-                "assignment/clusters/**",
-                "assignment/routes/**",
-                "assignment/sorties/**",
-                "assignment/further/**",
-            ],
+        _plane(
+            "Hot spots, passes and sorties",
+            "contour/eroded",
+            "assignment/hot_spots",
+            "assignment/passes",
+            "assignment/clusters",
+            "assignment/routes",
+            "assignment/sorties",
+            "assignment/further",
         ),
         name="Assignment",
     )
 
 
-def _certificate() -> rrb.Spatial2DView:
-    return rrb.Spatial2DView(origin="/", name="Certificate", contents=["contour/raw/**", "certificate/**"])
+def _decomposition() -> rrb.Horizontal:
+    return _beside(
+        "Decomposition",
+        _plane("Cells and critical points", "decomposition/cells", "decomposition/critical_points"),
+        rrb.GraphView(origin="decomposition/reeb", name="Reeb graph"),
+        _plot("Predicted cost of each heading", "decomposition/scores/predicted_cost"),
+    )
 
 
 def _log() -> rrb.Vertical:
@@ -117,3 +99,19 @@ def _log() -> rrb.Vertical:
         ),
         name="Log and timings",
     )
+
+
+def _plane(name: str, *entities: str) -> rrb.Spatial2DView:
+    """Layers of several stages in one plane."""
+    return rrb.Spatial2DView(origin="/", name=name, contents=[f"{entity}/**" for entity in entities])
+
+
+def _plot(name: str, *figures: str) -> rrb.TimeSeriesView:
+    """Figures of one unit, step by step."""
+    return rrb.TimeSeriesView(origin="/", name=name, contents=list(figures))
+
+
+def _beside(name: str, main: rrb.View, second: rrb.View, *small: rrb.View) -> rrb.Horizontal:
+    """A tab: one large view, and beside it a second one above small ones."""
+    column = rrb.Vertical(second, *small, row_shares=[3, *(1 for _ in small)])
+    return rrb.Horizontal(main, column, column_shares=[3, 2], name=name)

@@ -26,11 +26,9 @@ PALETTE: dict[tuple[str, str], Colour] = {
     ("contour", "eroded"): (38, 166, 154),
     ("contour", "dropped"): (229, 57, 53),
     ("assignment", "mesh"): (55, 71, 79),
-    ("assignment", "shares"): (255, 179, 0),
     ("assignment", "hot_spots"): (236, 64, 122),
     ("assignment", "passes"): (144, 164, 174),
     ("assignment", "routes"): (100, 181, 246),
-    ("assignment", "sorties"): (66, 165, 245),
     ("assignment", "further"): (186, 104, 200),
     ("decomposition", "cells"): (100, 181, 246),
     ("decomposition", "critical_points"): (255, 112, 67),
@@ -46,14 +44,29 @@ PALETTE: dict[tuple[str, str], Colour] = {
     ("path", "circuit"): (255, 179, 0),
     ("path", "cuts"): (236, 64, 122),
     ("path", "path"): (66, 165, 245),
-    ("certificate", "path"): (66, 165, 245),
 }
 OTHER: Colour = (176, 190, 197)
+TEAM: tuple[Colour, ...] = (
+    (66, 165, 245),
+    (255, 112, 67),
+    (102, 187, 106),
+    (186, 104, 200),
+    (255, 213, 79),
+    (38, 198, 218),
+    (240, 98, 146),
+    (176, 190, 197),
+)
+"""Colours of what is told apart, in turn: vehicles, and kinds of a graph's nodes."""
+BY_VEHICLE = frozenset({("assignment", "shares"), ("assignment", "sorties"), ("certificate", "path")})
+"""Layers that have one geometry a vehicle, all in the same order: share or sortie, and path."""
 NEAR, FAR = np.array([38, 166, 154]), np.array([229, 57, 53])
 """Ends of the scale for values from 0 to 1."""
 
 MOST_LABELS = 40
 """More labels than these are kept, but not shown at once."""
+
+NODE_APART = 120.0
+"""About how far apart a graph's nodes are drawn, in units of the screen: their labels need that."""
 
 ON_MAP = frozenset(
     {("mission", "site"), ("contour", "eroded"), ("certificate", "path"), ("certificate", "worst_gap")}
@@ -87,15 +100,14 @@ def draw(layer: Layer, frame: Frame | None) -> Iterator[Drawn]:
 def _flat(layer: Layer, entity: str) -> Iterator[Drawn]:
     strips, owners = _strips(layer.geometries)
     colours = _colours(layer)
-    labels = [layer.labels[owner] for owner in owners] if layer.labels else None
-    show_labels = labels is not None and len(labels) <= MOST_LABELS
+    show_labels = 0 < len(layer.labels) <= MOST_LABELS
     if strips:
         yield Drawn(
             f"{entity}/lines",
             rr.LineStrips2D(
                 [strip * (1, -1) for strip in strips],
                 colors=colours[owners],
-                labels=labels,
+                labels=_strip_labels(layer, owners),
                 show_labels=show_labels,
                 radii=layer.width_m / 2 if layer.width_m > 0 else rr.Radius.ui_points(1.0),
             ),
@@ -108,7 +120,7 @@ def _flat(layer: Layer, entity: str) -> Iterator[Drawn]:
                 points * (1, -1),
                 colors=colours[number],
                 labels=[layer.labels[index] for index in number] if layer.labels else None,
-                show_labels=bool(layer.labels) and len(points) <= MOST_LABELS,
+                show_labels=show_labels,
                 radii=rr.Radius.ui_points(3.5),
             ),
         )
@@ -132,19 +144,27 @@ def _graph(layer: Layer, entity: str) -> Iterator[Drawn]:
     names = [str(index) for index in range(len(layer.nodes))]
     places = shapely.get_coordinates(np.asarray(layer.geometries)) if layer.geometries else None
     kinds = sorted(set(layer.nodes))
-    hues = [tuple(PALETTE.values())[3 + kinds.index(node)] for node in layer.nodes]
+    hues = [TEAM[kinds.index(node) % len(TEAM)] for node in layer.nodes]
     yield Drawn(
         entity,
         rr.GraphNodes(
             names,
             labels=list(layer.nodes),
             colors=hues,
-            positions=None if places is None else places * (1, -1),
+            positions=None if places is None else _on_screen(places),
             show_labels=len(names) <= MOST_LABELS,
         ),
     )
     edges = [(str(a), str(b)) for a, b in layer.edges]
-    yield Drawn(f"{entity}/edges", rr.GraphEdges(edges, graph_type="undirected"))
+    # Edges under another entity would join nodes of their own.
+    yield Drawn(entity, rr.GraphEdges(edges, graph_type="undirected"))
+
+
+def _on_screen(places: FloatArray) -> FloatArray:
+    """Places in metres as those of nodes, whose size is one of the screen."""
+    extent_m = float(np.ptp(places, axis=0).max())
+    scale = NODE_APART * np.sqrt(len(places)) / extent_m if extent_m > 0 else 1.0
+    return places * (scale, -scale)
 
 
 def _strips(geometries: tuple[BaseGeometry, ...]) -> tuple[list[FloatArray], list[int]]:
@@ -160,6 +180,14 @@ def _strips(geometries: tuple[BaseGeometry, ...]) -> tuple[list[FloatArray], lis
     return strips, owners
 
 
+def _strip_labels(layer: Layer, owners: list[int]) -> list[str] | None:
+    """The label of each geometry at its first line; its further ones, as the islands of a polygon, have none."""
+    if not layer.labels:
+        return None
+    first = dict(reversed([(owner, number) for number, owner in enumerate(owners)]))
+    return [layer.labels[owner] if first[owner] == number else "" for number, owner in enumerate(owners)]
+
+
 def _points(geometries: tuple[BaseGeometry, ...]) -> tuple[FloatArray, list[int]]:
     numbered = [(number, part) for number, whole in enumerate(geometries) for part in shapely.get_parts(whole)]
     points = [(number, part) for number, part in numbered if part.geom_type == "Point"]
@@ -168,9 +196,12 @@ def _points(geometries: tuple[BaseGeometry, ...]) -> tuple[FloatArray, list[int]
 
 
 def _colours(layer: Layer) -> np.ndarray[tuple[int, int], np.dtype[np.uint8]]:
-    """One colour a geometry: by value, or the layer's, or the palette's."""
+    """One colour a geometry: by value, by vehicle, or the layer's, or the palette's."""
     if layer.values:
         share = np.clip(np.asarray(layer.values), 0.0, 1.0)[:, None]
         return np.asarray(NEAR + share * (FAR - NEAR), dtype=np.uint8)
+    if (layer.stage, layer.name) in BY_VEHICLE:
+        numbers = np.arange(len(layer.geometries)) % len(TEAM)
+        return np.asarray(TEAM, dtype=np.uint8)[numbers]
     one = layer.colour or PALETTE.get((layer.stage, layer.name), OTHER)
     return np.tile(np.asarray(one, dtype=np.uint8), (len(layer.geometries), 1))

@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import shapely
 
@@ -11,6 +12,7 @@ from oxbow.mission import read_mission
 from oxbow.pipeline import plan_mission
 from oxbow.recording import Layer, LayerKind, Stamped
 from oxbow_cli.local import local_call
+from oxbow_recorder.blueprint import blueprint
 from oxbow_recorder.drawing import draw
 from oxbow_recorder.recordings import IDLE_S, Recordings
 
@@ -59,6 +61,55 @@ def test_a_plan_is_recorded_and_read_back(layers, tmp_path):
 def test_every_layer_is_drawn(layers):
     for layer in (each for each in layers if each.geometries or each.scalars or each.text):
         assert list(draw(layer, None)), f"{layer.stage}/{layer.name}"
+
+
+def drawn_entities(layers):
+    return {drawn.entity for layer in layers for drawn in draw(layer, None)}
+
+
+def test_every_layer_of_a_plan_is_in_some_view(layers):
+    """What no view of a flat stage contains would be recorded for nobody."""
+    shown = drawn_entities(layer for layer in layers if layer.geometries or layer.kind is LayerKind.GRAPH)
+    views = [str(content).lstrip("/").removesuffix("/**") for content in contents(blueprint().root_container)]
+    unseen = {entity for entity in shown if not any(entity.startswith(view) for view in views)}
+    assert unseen <= {"path/start/lines"}
+
+
+def contents(part):
+    """The entities of all views of a container; those of a view with an origin of its own are all below it."""
+    for inner in getattr(part, "contents", ()):
+        if isinstance(inner, str):
+            yield inner.replace("$origin", str(part.origin))
+        else:
+            yield from contents(inner)
+
+
+def test_each_vehicle_has_one_colour_in_shares_and_paths():
+    halves = (shapely.box(0, 0, 10, 10), shapely.box(10, 0, 20, 10))
+    paths = tuple(half.exterior for half in halves)
+    (shares,) = draw(Layer(stage="assignment", name="shares", geometries=halves, labels=("a", "b")), None)
+    (certified,) = draw(Layer(stage="certificate", name="path", geometries=paths), None)
+    colours = [drawn.archetype.colors.as_arrow_array().to_pylist() for drawn in (shares, certified)]
+    assert colours[0] == colours[1]
+    assert len(set(colours[0])) == 2
+
+
+def test_a_graph_has_its_nodes_where_its_edges_are():
+    """Edges under another entity than the nodes' would join nodes of their own."""
+    places = (shapely.Point(0, 0), shapely.Point(3_000, 0), shapely.Point(0, -4_000))
+    nodes, edges = ("open", "split", "close"), ((0, 1), (1, 2))
+    layer = Layer(stage="x", name="reeb", kind=LayerKind.GRAPH, geometries=places, nodes=nodes, edges=edges)
+    drawn = list(draw(layer, None))
+    assert [each.entity for each in drawn] == ["x/reeb"] * 2
+    positions = np.array(drawn[0].archetype.positions.as_arrow_array().to_pylist())
+    assert positions[2] - positions[0] == pytest.approx((positions[1] - positions[0])[::-1] * 4 / 3)
+    assert 100 < np.ptp(positions) < 1_000, "as large as labels need, whatever the lake"
+
+
+def test_an_island_does_not_repeat_the_label_of_its_water():
+    ring = shapely.box(0, 0, 10, 10).difference(shapely.box(4, 4, 6, 6))
+    (lines,) = draw(Layer(stage="x", name="y", geometries=(ring, ring), labels=("a", "b")), None)
+    assert lines.archetype.labels.as_arrow_array().to_pylist() == ["a", "", "b", ""]
 
 
 def test_another_run_replaces_the_recording_as_a_whole(tmp_path):
