@@ -26,6 +26,7 @@ __all__ = [
     "following",
     "paired",
     "side_lengths",
+    "spread",
     "triangulated",
     "twins_of",
 ]
@@ -51,11 +52,25 @@ def triangulated(faces: BaseGeometry | Geometries) -> tuple[FloatArray, Indices]
     triangles : ndarray of int, shape (m, 3)
         None has its corners in line.
     """
-    parts = shapely.get_parts(shapely.get_parts(shapely.constrained_delaunay_triangles(faces)))
-    # GEOS goes round them clockwise.
-    corners = shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, 2::-1]
-    points, index = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
+    points, index = np.unique(_corners(faces).reshape(-1, 2), axis=0, return_inverse=True)
     return points, _without_flats(points, index.reshape(-1, 3))
+
+
+def spread(square: FloatArray, region: BaseGeometry) -> FloatArray:
+    """Carry points (n, 2) of the unit square onto a region, equal areas onto equal areas.
+
+    The region's triangles are laid end to end by area. The first coordinate chooses one, and what is left of it how
+    far across the triangle; the second one chooses how far along. No point is lost, however thin the region.
+    """
+    corners = _corners(region)
+    areas_m2 = np.maximum(doubled_areas(corners), 0.0) / 2
+    ends_m2 = np.cumsum(areas_m2)
+    at_m2 = square[:, 0] * ends_m2[-1]
+    chosen = np.minimum(np.searchsorted(ends_m2, at_m2, side="right"), len(ends_m2) - 1)
+    left = np.clip((ends_m2[chosen] - at_m2) / areas_m2[chosen], 0.0, 1.0)
+    a, b, c = np.moveaxis(corners[chosen], 1, 0)
+    from_apex, along = np.sqrt(left)[:, None], square[:, 1:]
+    return np.asarray((1 - from_apex) * c + from_apex * ((1 - along) * b + along * a))
 
 
 def twins_of(triangles: Indices) -> Indices:
@@ -118,6 +133,13 @@ def angles_rad(corners: FloatArray) -> FloatArray:
     """The angle at each corner, shape (m, 3)."""
     ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     return np.asarray(np.arctan2(cross(ahead, behind), (ahead * behind).sum(axis=2)))
+
+
+def _corners(faces: BaseGeometry | Geometries) -> FloatArray:
+    """The triangles of polygons, shape (m, 3, 2), counterclockwise."""
+    parts = shapely.get_parts(shapely.get_parts(shapely.constrained_delaunay_triangles(faces)))
+    # GEOS goes round them clockwise.
+    return np.asarray(shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, 2::-1])
 
 
 def _without_flats(points: FloatArray, triangles: Indices) -> Indices:

@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 from shapely import MultiPolygon
 
 from oxbow.contracts import FloatArray
+from oxbow.triangles import spread
 from oxbow_certificate.distance import PathDistance
 
 __all__ = ["DistanceSpread", "distance_spread", "even_places"]
@@ -49,17 +49,8 @@ def distance_spread(region: MultiPolygon, distance: PathDistance, *, count: int 
 def even_places(region: MultiPolygon, count: int) -> FloatArray:
     """Places (count, 2) spread over `region` evenly by area: the same for the same arguments.
 
-    The region is cut into triangles, laid end to end by area, and each of `count` equal shares of the whole takes
-    one place: within a triangle they are a Fibonacci lattice. No place is rejected, however thin the region, and
-    no grid falls into step with parallel transects.
+    A Fibonacci lattice of the unit square: each of `count` equal shares of the area takes one place, and no grid
+    falls into step with parallel transects.
     """
-    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(region))
-    corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
-    areas = shapely.area(triangles)
-    ends = np.cumsum(areas)
-    at = (np.arange(count) + 0.5) / count * ends[-1]
-    chosen = np.searchsorted(ends, at)
-    a, b, c = corners[chosen].transpose(1, 0, 2)
-    root = np.sqrt((ends[chosen] - at) / areas[chosen])[:, None]
-    v = (np.arange(count) / _GOLDEN_RATIO % 1.0)[:, None]
-    return np.asarray((1 - root) * a + root * ((1 - v) * b + v * c))
+    number = np.arange(count)
+    return spread(np.column_stack([(number + 0.5) / count, number / _GOLDEN_RATIO % 1.0]), region)

@@ -8,7 +8,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from path_requests import lake
-from shapely import affinity
+from scipy.stats import qmc
+from shapely import affinity, box
 
 from oxbow.testing import nasty_polygons
 from oxbow.triangles import (
@@ -19,6 +20,7 @@ from oxbow.triangles import (
     flipped,
     following,
     side_lengths,
+    spread,
     triangulated,
     twins_of,
 )
@@ -63,6 +65,25 @@ def test_a_flip_exchanges_the_diagonals_of_a_quadrilateral(seed, choice):
     ends = {*apexes(triangles, side).tolist(), *apexes(triangles, twins[side]).tolist()}
     assert set(other[changed[0]]) & set(other[changed[1]]) == ends
     assert doubled_areas(points[other]).sum() == pytest.approx(doubled_areas(points[triangles]).sum())
+
+
+@pytest.mark.parametrize("name", sorted(nasty_polygons()))
+def test_the_unit_square_is_spread_over_a_region_by_area(name):
+    region = nasty_polygons()[name]
+    places = spread(qmc.Halton(2, scramble=False).random(4000), region)
+    assert shapely.covers(region.buffer(1e-6), shapely.points(places)).all()
+    low_x, low_y, high_x, high_y = region.bounds
+    for part in (box(low_x, low_y, (low_x + high_x) / 2, high_y), box(low_x, low_y, high_x, (low_y + high_y) / 2)):
+        share = shapely.contains_xy(part, places).mean()
+        assert share == pytest.approx(part.intersection(region).area / region.area, abs=0.02)
+
+
+@quick
+@given(along=st.floats(0.0, 1.0), across=st.floats(0.0, 1.0))
+def test_edges_of_the_unit_square_stay_in_the_region(along, across):
+    corners = np.array([(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0), (along, across)])
+    region = nasty_polygons()["islands in a grid"]
+    assert shapely.dwithin(region, shapely.points(spread(corners, region)), 1e-9).all()
 
 
 def test_a_triangle_is_measured_by_hand():

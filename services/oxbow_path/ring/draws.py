@@ -48,6 +48,7 @@ def _unit_square(count: int, generator: np.random.Generator, draw: Draw) -> Floa
 def cell_draws(cell: Cell, square: FloatArray) -> FloatArray:
     """Carry points (n, 2) of the unit square onto a cell, equal areas onto equal areas.
 
+    Unlike `oxbow.triangles.spread`, it is continuous: what is even in the square is even across the whole cell.
     The first coordinate chooses the abscissa that has this share of the cell's area to its left, the second the
     height between floor and ceiling.
     """

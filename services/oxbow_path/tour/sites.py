@@ -9,6 +9,7 @@ from scipy.stats import qmc
 from shapely import Polygon
 
 from oxbow.contracts import FloatArray
+from oxbow.triangles import spread
 
 __all__ = ["clustered", "low_discrepancy", "with_gaps"]
 
@@ -20,9 +21,8 @@ def low_discrepancy(free: Polygon, count: int, *, seed: int) -> FloatArray:
     """Points of low discrepancy over a polygon, by area.
 
     The report keeps those points of a sequence over the bounding box that lie in the polygon. Here every point of
-    the Halton sequence is used: its first coordinate chooses a triangle of the polygon by area, what is left of
-    that coordinate and the second one choose a place in the triangle. The sequence is shifted at random, modulo 1
-    (Cranley and Patterson 1976).
+    the Halton sequence is used, carried from the unit square onto the polygon (`oxbow.triangles.spread`). The
+    sequence is shifted at random, modulo 1 (Cranley and Patterson 1976).
 
     Parameters
     ----------
@@ -38,18 +38,8 @@ def low_discrepancy(free: Polygon, count: int, *, seed: int) -> FloatArray:
     array, shape (count, 2)
         Its first points alone are spread evenly, too.
     """
-    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(free))
-    corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
-    end = np.cumsum(shapely.area(triangles))
     shift = np.random.default_rng(seed).random(2)
-    sequence = (qmc.Halton(2, scramble=False).random(count) + shift) % 1.0
-    target = sequence[:, 0] * end[-1]
-    chosen = np.minimum(np.searchsorted(end, target, side="right"), len(end) - 1)
-    start = np.concatenate([[0.0], end])
-    left = np.clip((target - start[chosen]) / (start[chosen + 1] - start[chosen]), 0.0, 1.0)
-    from_corner, along = np.sqrt(left)[:, None], sequence[:, 1:]
-    a, b, c = np.moveaxis(corners[chosen], 1, 0)
-    return np.asarray((1 - from_corner) * a + from_corner * ((1 - along) * b + along * c))
+    return spread((qmc.Halton(2, scramble=False).random(count) + shift) % 1.0, free)
 
 
 def clustered(samples: FloatArray, count: int, free: Polygon) -> FloatArray:
