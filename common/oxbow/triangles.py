@@ -59,8 +59,8 @@ def triangulated(faces: BaseGeometry | Geometries) -> tuple[FloatArray, Indices]
 def spread(square: FloatArray, region: BaseGeometry) -> FloatArray:
     """Carry points (n, 2) of the unit square onto a region, equal areas onto equal areas.
 
-    The region's triangles are laid end to end by area. The first coordinate chooses one, and what is left of it how
-    far across the triangle; the second one chooses how far along. No point is lost, however thin the region.
+    Triangles of the region are laid end to end by area. The first coordinate chooses one, and how far across it;
+    the second one chooses how far along. No point is lost, however thin the region.
     """
     corners = _corners(region)
     areas_m2 = np.maximum(doubled_areas(corners), 0.0) / 2
