@@ -35,6 +35,8 @@ ROUNDING_M = 1e-6
 """Places nearer to each other than this are one."""
 OFF_M = 1e-2
 """A leg that strays so little from the water stays in it: what the certificate takes for the shore."""
+FAR = 0.25
+"""Legs that take more than this share of a range are told: they are missing where the vehicle surveys."""
 SPARE = 1.001
 """Legs are so many times as long as their middle lines, at most, but for the ends."""
 
@@ -74,13 +76,27 @@ class Approach:
         Infeasible
             Nothing: the legs alone are longer.
         """
-        legs = [LineString(leg) for leg in (self.out, self.home) if leg is not None]
-        legs_m = sum(SPARE * leg.length + 6.0 * self.apart_m for leg in legs)
-        if legs_m >= range_m:
+        if self._legs_m >= range_m:
             raise Infeasible(
-                f"is {range_m:.0f} m; the way to the vehicle's share and home is {legs_m:.0f} m", "Master_length"
+                f"is {range_m:.0f} m; the way to the vehicle's share and home is {self._legs_m:.0f} m",
+                "Master_length",
             )
-        return range_m - legs_m
+        return range_m - self._legs_m
+
+    def warnings(self, range_m: float) -> tuple[str, ...]:
+        """What is to be known of legs that take much of a range: shares are balanced by range, not by what is left."""
+        if self._legs_m <= FAR * range_m:
+            return ()
+        return (
+            f"the way to its share and home takes {self._legs_m / range_m:.0%} of its {range_m:.0f} m: the share is"
+            " surveyed at a wider spacing; start it nearer, or give it more length",
+        )
+
+    @property
+    def _legs_m(self) -> float:
+        """How long the legs may become."""
+        legs = [LineString(leg) for leg in (self.out, self.home) if leg is not None]
+        return sum(SPARE * leg.length + 6.0 * self.apart_m for leg in legs)
 
     def joined(self, path: LineString) -> LineString:
         """A path in the share, with its legs: from the vehicle's start to its recovery.

@@ -184,7 +184,7 @@ def _covered(task: Task, member: Member, approach: Approach, water_m2: float) ->
             spacing_m=plan.spacing_m,
             area_m2=approach.space.free.area,
             dropped=plan.dropped,
-            warnings=plan.warnings,
+            warnings=approach.warnings(member.vehicle.length_m) + plan.warnings,
         )
 
 

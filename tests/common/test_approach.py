@@ -94,6 +94,14 @@ def test_a_way_that_is_longer_than_the_range_is_refused_with_its_length():
         approach.length_m(900.0)
 
 
+def test_a_way_that_takes_much_of_the_range_is_told():
+    approach = Harbour(SPACE, SPACING_M).approach(EAST, vehicle((50.0, 200.0)))
+    legs_m = 1e5 - approach.length_m(1e5)
+    assert not approach.warnings(5.0 * legs_m)
+    (told,) = approach.warnings(2.0 * legs_m)
+    assert "takes 50% of its" in told
+
+
 def test_lanes_are_as_narrow_as_the_water():
     strait = LAKE - box(300, 4.0, 500, 200)
     free = strait.buffer(-1.0, join_style="mitre")
