@@ -84,12 +84,12 @@ class Approach:
         return range_m - self._legs_m
 
     def warnings(self, range_m: float) -> tuple[str, ...]:
-        """What is to be known of legs that take much of a range: shares are balanced by range, not by what is left."""
+        """What is to be known of long legs: shares are balanced by range, not by what legs leave of it."""
         if self._legs_m <= FAR * range_m:
             return ()
         return (
-            f"the way to its share and home takes {self._legs_m / range_m:.0%} of its {range_m:.0f} m: the share is"
-            " surveyed at a wider spacing; start it nearer, or give it more length",
+            f"the way to its share and home takes {self._legs_m / range_m:.0%} of its {range_m:.0f} m: it surveys the"
+            " share at a wider spacing; start it nearer, or give it more length",
         )
 
     @property
