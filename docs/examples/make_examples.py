@@ -15,6 +15,7 @@ from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray, Role, Variogram, VariogramModel
+from oxbow.danger_zones import GivenDangerZone
 from oxbow.frame import Frame, Position
 from oxbow.mission import Bloom, Mission, MissionType, write_mission
 from oxbow.prior import PriorFeature, PriorModel, prior_document
@@ -140,7 +141,7 @@ def fleet() -> Mission:
 
 
 def treat() -> Mission:
-    """The meander, with three blooms to treat and a place that a swimmer reported, by two boats."""
+    """The meander, with three blooms to treat and a place that a swimmer reported, by two boats; a danger zone."""
     frame, rng = Frame(lat=44.2, long=-0.4), np.random.default_rng(7)
     places = [(-1060, 150, 45, 34.0), (-30, -900, 50, 41.0), (620, -720, 40, 55.0)]
     blooms = [
@@ -148,6 +149,7 @@ def treat() -> Mission:
         for x, y, radius, value in places
     ]
     seen = PriorFeature(geometry=in_degrees(frame, Point(1010.0, 350.0)), value=38.0)
+    trees = Point(-560.0, -560.0).buffer(80.0, quad_segs=4)
     boats = (
         GivenVehicle(name="tern", role=Role.SLAVE, length_m=5_000.0),
         GivenVehicle(name="gull", role=Role.SLAVE, speed_mps=0.8, length_m=9_000.0),
@@ -158,6 +160,7 @@ def treat() -> Mission:
         recovery=None,
         minimal_spatial_rate_m=None,
         swath_m=10.0,
+        danger_zones=(GivenDangerZone(name="sunken trees", contour=ring(frame, trees), danger=0.1),),
         vehicles=boats,
         prior_model=PriorModel(features=(*blooms, seen)),
     )

@@ -19,6 +19,7 @@ LESS_IS_BETTER = (
     "crossings",
     "outside_m",
     "unsafe_m",
+    "danger",
     "starts_at_launch_m",
     "ends_at_recovery_m",
     "cover_radius_m",
@@ -97,6 +98,8 @@ def _differences(first: Mission, second: Mission) -> Iterator[str]:
         yield "{}: {:.4g} and {:.4g} km2 within".format(first.outline_name, *areas_km2)
     elif not shapely.union_all(here.zones).equals(shapely.union_all(there.zones)):
         yield f"ForbiddenZones: {len(here.zones)} and {len(there.zones)}, not the same"
+    if first.danger_zones != second.danger_zones:
+        yield f"DangerZones: {len(here.danger_zones)} and {len(there.danger_zones)}, not the same"
     for name, one_m, other_m in (
         ("Safety", first.safety_m, second.safety_m),
         ("Master_length", first.master_length_m, second.master_length_m),

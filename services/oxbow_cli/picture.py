@@ -25,6 +25,7 @@ _COLOURS = 256
 FLEET = ("#2166ac", "#d6604d", "#1b7837", "#762a83", "#b35806", "#01665e", "#c51b7d", "#4d4d4d")
 """Colours of the vehicles of a fleet, in turn."""
 SPOT = "#f6c1b5"
+DANGER = "#d9822b"
 
 
 def draw(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
@@ -50,6 +51,7 @@ def draw(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     sheet.draw_site(axes, site, mission.safety_m)
     for spot in site.hot_spots:
         axes.add_patch(sheet.patch(spot.area, facecolor=SPOT, edgecolor=GAP, linewidth=0.7, alpha=0.7, zorder=3))
+    _draw_danger(axes, site)
     paths = [site.frame.to_planar(lonlat(planned.path)) for planned in mission.planned_paths]
     if len(paths) == 1:
         _draw_path(axes, paths[0], site.nominal_spacing_m)
@@ -61,6 +63,18 @@ def draw(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     sheet.draw_scale_and_north(axes)
     sheet.draw_header(figure, mission.site_name or "Survey mission", _figures(mission))
     sheet.save_sheet(figure, path, width_px)
+
+
+def _draw_danger(axes: Axes, site: Site) -> None:
+    """Danger zones, as far as they are water, hatched, with their names and dangers."""
+    style = {"facecolor": "none", "edgecolor": DANGER, "hatch": r"\\\\", "linewidth": 0.8, "zorder": 3.5}
+    for number, zone in enumerate(site.danger_zones):
+        water = zone.area.intersection(site.outline)
+        in_key = "_another" if number else "danger zone"
+        axes.add_patch(sheet.patch(water, label=in_key, **style))
+        place = water.representative_point()
+        text = f"{zone.name}: danger {zone.probability:g} a {zone.per}"
+        sheet.note(axes, (place.x, place.y), text, colour=DANGER)
 
 
 def _draw_path(axes: Axes, xy: FloatArray, spacing_m: float) -> None:

@@ -101,6 +101,8 @@ def _plan_table(site: str, plan: PlanRecord) -> Table:
         # A way home may cross the way out where hot spots are treated between them.
         ("conforms", _conformance(None if treats_only else certificate.is_simple, certificate)),
     ]
+    if certificate.danger is not None:
+        rows.append(("danger", f"{certificate.danger:.1%} probability of harm on the way"))
     if plan.mission_id is not None:
         rows.insert(0, ("mission", f"{plan.mission_id}, revision {plan.revision}"))
     rows += _fleet_rows(plan)
@@ -116,7 +118,9 @@ def _fleet_rows(plan: PlanRecord) -> Rows:
         task = f"treats {', '.join(vehicle.hot_spots)}" if vehicle.hot_spots else "surveys"
         if not vehicle.hot_spots and vehicle.area_m2 is not None:
             task += f" {vehicle.area_m2 / 1e6:.3f} km2"
-        yield vehicle.name, f"{vehicle.role}: {way}; {task}"
+        danger = vehicle.certificate.danger
+        risk = "" if danger is None else f"; danger {danger:.1%}"
+        yield vehicle.name, f"{vehicle.role}: {way}; {task}{risk}"
     if plan.treatment is None:
         return
     for spot in plan.treatment.hot_spots:

@@ -20,6 +20,8 @@ def test_the_table_tells_what_each_vehicle_does_and_what_is_left(treated):
     assert "treats features[0]" in treated
     assert "100.0% treated" in treated
     assert "further sortie" in treated
+    assert "danger 0.0%" in treated
+    assert "0.0% probability of harm" in treated
 
 
 @pytest.mark.usefixtures("treated")
@@ -28,6 +30,7 @@ def test_every_vehicle_is_evaluated(oxbow):
     assert [vehicle["name"] for vehicle in found["vehicles"]] == ["tern", "gull"]
     assert found["length_m"] == pytest.approx(sum(vehicle["length_m"] for vehicle in found["vehicles"]))
     assert found["length_ratio"] == max(vehicle["length_ratio"] for vehicle in found["vehicles"])
+    assert [vehicle["danger"] for vehicle in found["vehicles"]] == [0.0, 0.0]
     assert "Path of gull" in oxbow("evaluate", "treated.json").stdout
 
 
@@ -45,5 +48,5 @@ def test_a_path_of_a_vehicle_that_takes_no_part_is_named(oxbow, folder):
 def test_all_paths_are_drawn_with_their_names(oxbow, folder):
     assert oxbow("picture", "treated.json", "-o", "treated.svg").returncode == 0
     drawn = (folder / "treated.svg").read_text()
-    assert all(name in drawn for name in ("tern", "gull", "4 hot spots"))
+    assert all(name in drawn for name in ("tern", "gull", "4 hot spots", "danger zone"))
     assert oxbow("picture", "treated.json", "--gaps", "-o", "gaps.svg").returncode == 0

@@ -11,6 +11,7 @@ import shapely
 from oxbow.mission import read_mission
 from oxbow.pipeline import plan_mission
 from oxbow.recording import Layer, LayerKind, Stamped
+from oxbow.route import RouteMethod
 from oxbow_cli.local import local_call
 from oxbow_recorder.blueprint import blueprint
 from oxbow_recorder.drawing import draw
@@ -73,6 +74,16 @@ def test_every_layer_of_a_plan_is_in_some_view(layers):
     views = [str(content).lstrip("/").removesuffix("/**") for content in contents(blueprint().root_container)]
     unseen = {entity for entity in shown if not any(entity.startswith(view) for view in views)}
     assert unseen <= {"path/start/lines"}
+
+
+def test_danger_zones_and_the_routes_of_every_method_are_in_some_view():
+    shown: list[Layer] = []
+    plan_mission(read_mission(LAKE.with_name("treat.json")), call=local_call(shown.append))
+    entities = drawn_entities(shown)
+    views = [str(content).removesuffix("/**") for content in contents(blueprint().root_container)]
+    for name in ("danger_zones", *(f"routes_{method}" for method in RouteMethod)):
+        assert f"assignment/{name}/lines" in entities
+        assert f"assignment/{name}" in views
 
 
 def contents(part):
