@@ -1,8 +1,14 @@
-"""A map of a path's gaps: the water coloured by its distance to the path."""
+"""A map of a mission's gaps: the water coloured by its distance to the paths.
+
+Of a survey it is the whole free space, in units of the least radius that paths of the same length could have: blue
+is what the best of them would leave, warm colours are beyond it. Of a treatment it is the hot spots, in half
+swaths: warm is what no pass has treated.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +19,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from shapely import MultiPolygon, Polygon
 
-from oxbow.contracts import CertifyRequest, Place
+from oxbow.contracts import Place
 from oxbow.mission import Mission
 from oxbow.site import Site
 from oxbow_certificate.axes import Paths
@@ -23,10 +29,10 @@ from oxbow_cli import sheet
 from oxbow_cli.evaluation import certify_request
 from oxbow_cli.sheet import GAP, INK
 
-__all__ = ["GAPS", "MOST_RADII", "draw_gaps"]
+__all__ = ["GAPS", "MOST_RADII", "Unit", "draw_gaps"]
 
 MOST_RADII = 2.5
-"""The scale's end, in least radii: the same in every picture, so that pictures can be compared."""
+"""The scale's end, in units of `Unit`: the same in every picture, so that pictures can be compared."""
 
 GAPS = LinearSegmentedColormap.from_list(
     "gaps",
@@ -51,8 +57,25 @@ _MAGNIFIED_RADII = 3.5
 """How much of the worst gap's surroundings is drawn magnified, in radii of the gap."""
 
 
+@dataclass(frozen=True)
+class Unit:
+    """What distances are told in: its length, and the name of several."""
+
+    length_m: float
+    name: str
+
+    @classmethod
+    def of(cls, mission: Mission, judgement: Judgement, *, treats: bool) -> Unit:
+        """The least radius of a survey; half a swath of a treatment, where radii of that length say nothing."""
+        if treats and mission.treated_swath_m is not None:
+            return cls(mission.treated_swath_m / 2, "half swaths")
+        return cls(judgement.certificate.least_radius_m, "least radii")
+
+
 def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
-    """Draw the distance of a mission's water to its path to a PNG or SVG file, in units of the least radius.
+    """Draw the distance of a mission's water to its paths to a PNG or SVG file, and its worst gap.
+
+    The worst gap is drawn magnified beside the water, where there is room and it gets twice as large at least.
 
     Parameters
     ----------
@@ -74,37 +97,39 @@ def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     site = Site.of(mission)
     request = certify_request(mission, site)
     judgement = judge(request)
+    unit = Unit.of(mission, judgement, treats=bool(request.areas))
     figure, axes = sheet.new_sheet(site)
     sheet.draw_site(axes, site, mission.safety_m)
-    _draw_gaps(axes, judgement)
-    _note_worst_gap(axes, judgement)
-    _draw_magnified(figure, axes, site, judgement, request)
+    _draw_gaps(axes, judgement, unit)
+    _note_worst_gap(axes, judgement, unit)
     sheet.draw_ends(axes, site)
     sheet.draw_scale_and_north(axes)
-    _draw_key(figure, judgement.certificate.least_radius_m)
-    sheet.draw_header(figure, f"Gaps of {mission.site_name or 'the path'}", _figures(judgement))
+    _draw_magnified(figure, axes, site, judgement, unit, mission.safety_m)
+    _draw_key(figure, unit)
+    figures = _treated_figures(judgement, unit) if request.areas else _figures(judgement)
+    sheet.draw_header(figure, f"Gaps of {mission.site_name or 'the path'}", figures)
     sheet.save_sheet(figure, path, width_px)
 
 
-def _draw_gaps(axes: Axes, judgement: Judgement) -> None:
+def _draw_gaps(axes: Axes, judgement: Judgement, unit: Unit) -> None:
     """The distance, the paths, and the disc that the worst gap would hold."""
-    least_radius_m, radius_m = judgement.certificate.least_radius_m, judgement.cover.low_m
-    _draw_distance(axes, judgement.space.judged, judgement.paths, least_radius_m)
-    width = 0.6 * sheet.line_width(axes, 2.0 * least_radius_m)
+    _draw_distance(axes, judgement.space.judged, judgement.paths, unit)
+    width = 0.6 * sheet.line_width(axes, 2.0 * unit.length_m)
     paths = [shapely.get_coordinates(path) for path in shapely.get_parts(judgement.paths)]
     lines = LineCollection(paths, colors=INK, linewidths=width, alpha=0.75, zorder=4)
     axes.add_collection(lines, autolim=False)
-    sheet.draw_disc(axes, judgement.cover.place, radius_m)
+    sheet.draw_disc(axes, judgement.cover.place, judgement.cover.low_m)
 
 
-def _note_worst_gap(axes: Axes, judgement: Judgement) -> None:
+def _note_worst_gap(axes: Axes, judgement: Judgement, unit: Unit) -> None:
     (x, y), radius_m = judgement.cover.place, judgement.cover.low_m
-    radii = radius_m / judgement.certificate.least_radius_m
-    text = f"worst gap {sheet.distance_text(radius_m)}, {radii:.2f} least radii"
+    text = f"worst gap {sheet.distance_text(radius_m)}, {radius_m / unit.length_m:.2f} {unit.name}"
     sheet.note(axes, (x, y + radius_m), text, colour=GAP)
 
 
-def _draw_magnified(figure: Figure, axes: Axes, site: Site, judgement: Judgement, request: CertifyRequest) -> None:
+def _draw_magnified(
+    figure: Figure, axes: Axes, site: Site, judgement: Judgement, unit: Unit, safety_m: float
+) -> None:
     """The worst gap and the legs about it, beside the water; nowhere, where there is no room."""
     x, y = judgement.cover.place
     shown_m = _MAGNIFIED_RADII * judgement.cover.low_m
@@ -117,14 +142,14 @@ def _draw_magnified(figure: Figure, axes: Axes, site: Site, judgement: Judgement
     size = _MAGNIFIED_IN / figure.get_figwidth(), _MAGNIFIED_IN / figure.get_figheight()
     inset = figure.add_axes((*corner, *size), facecolor=sheet.LAND, xticks=[], yticks=[])
     inset.set(xlim=(x - shown_m, x + shown_m), ylim=(y - shown_m, y + shown_m))
-    sheet.draw_site(inset, site, request.safety_m)
-    _draw_gaps(inset, judgement)
-    inset.spines[:].set_color(GAP)
+    sheet.draw_site(inset, site, safety_m)
+    _draw_gaps(inset, judgement, unit)
+    inset.spines[:].set(color=GAP, zorder=9)
     inset.set_title(f"the worst gap, {times:.2g} times larger", fontsize=8, color=GAP, loc="left", pad=4)
 
 
 def _free_square(axes: Axes, site: Site, place: Place, side_m: float) -> Polygon | None:
-    """The square of a side, of those that meet neither the water nor the map's rim, that is nearest to a place."""
+    """The square of a side nearest to a place, of those that meet neither the water, a label nor the map's rim."""
     (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
     rim_m = 0.015 * (east - west)
     corners_x = np.linspace(west + rim_m, east - 4 * rim_m - side_m, 24)
@@ -132,12 +157,12 @@ def _free_square(axes: Axes, site: Site, place: Place, side_m: float) -> Polygon
     x, y = (axis.ravel() for axis in np.meshgrid(corners_x, corners_y))
     squares = shapely.box(x, y, x + side_m, y + side_m)
     ends = shapely.MultiPoint([site.launch, site.recovery]).buffer(4 * rim_m)
-    occupied = site.outline.union(ends).buffer(rim_m)
+    occupied = shapely.union_all([site.outline, ends, sheet.noted(axes)]).buffer(rim_m)
     free = squares[~shapely.intersects(occupied, squares)]
     return min(free, key=shapely.Point(place).distance, default=None)
 
 
-def _draw_distance(axes: Axes, region: MultiPolygon, paths: Paths, least_radius_m: float) -> None:
+def _draw_distance(axes: Axes, region: MultiPolygon, paths: Paths, unit: Unit) -> None:
     """The distance on a grid, clipped to the region."""
     (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
     pixel_m = (east - west) / 2000
@@ -151,10 +176,10 @@ def _draw_distance(axes: Axes, region: MultiPolygon, paths: Paths, least_radius_
     near = seen.buffer(2 * step_m)
     shapely.prepare(near)
     wanted = shapely.contains_xy(near, places[..., 0], places[..., 1])
-    radii = np.full(wanted.shape, np.nan)
-    radii[wanted] = PathDistance(paths)(places[wanted]) / least_radius_m
+    distance = np.full(wanted.shape, np.nan)
+    distance[wanted] = PathDistance(paths)(places[wanted]) / unit.length_m
     image = axes.imshow(
-        radii,
+        distance,
         extent=(x[0] - step_m / 2, x[-1] + step_m / 2, y[0] - step_m / 2, y[-1] + step_m / 2),
         origin="lower",
         cmap=GAPS,
@@ -169,12 +194,12 @@ def _draw_distance(axes: Axes, region: MultiPolygon, paths: Paths, least_radius_
     image.set_clip_path(clip)
 
 
-def _draw_key(figure: Figure, least_radius_m: float) -> None:
+def _draw_key(figure: Figure, unit: Unit) -> None:
     key = sheet.add_key(figure, 0.5, 0.44, GAPS)
-    for radii in np.arange(0.0, MOST_RADII + 0.5, 0.5):
-        text = f"{radii:g}" if radii < MOST_RADII else f"{radii:g} and more"
-        key.text(radii / MOST_RADII, -0.6, text, ha="center", va="top", fontsize=8, color=INK)
-    text = f"distance to the path, in least radii of {sheet.distance_text(least_radius_m)}"
+    for units in np.arange(0.0, MOST_RADII + 0.5, 0.5):
+        text = f"{units:g}" if units < MOST_RADII else f"{units:g} and more"
+        key.text(units / MOST_RADII, -0.6, text, ha="center", va="top", fontsize=8, color=INK)
+    text = f"distance to the path, in {unit.name} of {sheet.distance_text(unit.length_m)}"
     key.text(0.0, 1.5, text, ha="left", va="bottom", fontsize=8, color=INK)
 
 
@@ -186,3 +211,9 @@ def _figures(judgement: Judgement) -> str:
         f"{within:.0%} of the water within the least radius of the path   q {measures.q:.2f}"
         f"   p95 {measures.p95_ratio:.2f}   p99 {measures.p99_ratio:.2f}   mean {measures.mean_ratio:.2f}"
     )
+
+
+def _treated_figures(judgement: Judgement, unit: Unit) -> str:
+    """The same of a treatment: how much of the hot spots that the paths come to is treated."""
+    within = np.mean(judgement.spread.distance_m <= unit.length_m)
+    return f"{within:.1%} of the hot spots that are visited within half a swath of the path"

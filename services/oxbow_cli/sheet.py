@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +42,7 @@ __all__ = [
     "line_width",
     "new_sheet",
     "note",
+    "noted",
     "patch",
     "save_sheet",
 ]
@@ -51,6 +53,8 @@ LAND, WATER, MARGIN, SHORE, INK = "#f4f0e6", "#d3e6ef", "#e6f0f3", "#7d8f96", "#
 FORBIDDEN, FORBIDDEN_EDGE, GAP = "#e8d8c3", "#b5805a", "#c8322b"
 _DPI = 200
 _HEADER_IN, _FOOTER_IN = 0.85, 0.75
+_TOGETHER_M = 1.0
+"""Ends of paths that are no farther apart are drawn as one."""
 _HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
 
 
@@ -128,16 +132,27 @@ def patch(geometry: BaseGeometry, **style: object) -> PathPatch:
 
 
 def draw_ends(axes: Axes, site: Site) -> None:
-    """The launch and recovery points."""
-    together = math.dist(site.launch, site.recovery) < 1.0
-    ends = [(site.launch, "o", "launch and recovery" if together else "launch")]
-    if not together:
-        ends.append((site.recovery, "s", "recovery"))
-    for place, marker, label in ends:
+    """The launch and recovery points, and those that a vehicle has to itself."""
+    drawn: list[Place] = []
+    for place, marker, label in _ends(site):
+        if any(math.dist(place, other) < _TOGETHER_M for other in drawn):
+            continue
+        drawn.append(place)
         axes.plot(
             *place, marker=marker, markersize=7, color="white", markeredgecolor=INK, markeredgewidth=1.6, zorder=7
         )
         note(axes, place, label, colour=INK)
+
+
+def _ends(site: Site) -> Iterator[tuple[Place, str, str]]:
+    """Where paths may start and end: place, marker and label, the mission's own first."""
+    pairs = [("", site.launch, site.recovery)]
+    vehicles = [member.vehicle for member in site.members if member.is_named]
+    pairs += [(f"{vehicle.name}: ", vehicle.start, vehicle.recovery) for vehicle in vehicles]
+    for name, launch, recovery in pairs:
+        together = math.dist(launch, recovery) < _TOGETHER_M
+        yield launch, "o", f"{name}launch and recovery" if together else f"{name}launch"
+        yield recovery, "s", f"{name}recovery"
 
 
 def note(axes: Axes, place: Place, text: str, *, colour: str) -> None:
@@ -153,12 +168,20 @@ def note(axes: Axes, place: Place, text: str, *, colour: str) -> None:
         fontsize=8,
         color=colour,
         path_effects=_HALO,
+        parse_math=False,
         zorder=8,
     )
 
 
+def noted(axes: Axes) -> BaseGeometry:
+    """What the labels on a map cover."""
+    to_data = axes.transData.inverted()
+    corners = [to_data.transform(text.get_window_extent().get_points()) for text in axes.texts]
+    return shapely.union_all([shapely.box(*low, *high) for low, high in corners])
+
+
 def draw_scale_and_north(axes: Axes) -> None:
-    """A scale bar of a round length and an arrow to the north, below the map."""
+    """A scale bar of a round length below the map, and an arrow to the north above it."""
     (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
     bar_m = _round_down(0.2 * (east - west))
     x, y = west + 0.04 * (east - west), south - 0.35 * _FOOTER_IN * (north - south) / _map_height_in(axes)
@@ -176,11 +199,12 @@ def draw_scale_and_north(axes: Axes) -> None:
             )
         )
     axes.text(x + bar_m + 0.01 * (east - west), y, distance_text(bar_m), fontsize=8, color=INK, va="baseline")
+    height_in = axes.figure.get_window_extent().height / axes.figure.dpi
     axes.annotate(
         "N",
-        xy=(0.965, 0.985),
-        xytext=(0.965, 0.985 - 0.55 / _map_height_in(axes)),
-        xycoords="axes fraction",
+        xy=(0.965, 1 - 0.2 / height_in),
+        xytext=(0.965, 1 - 0.75 / height_in),
+        xycoords="figure fraction",
         ha="center",
         va="center",
         color=INK,
@@ -219,8 +243,8 @@ def add_key(figure: Figure, left: float, width: float, cmap: str | Colormap) -> 
 def draw_header(figure: Figure, title: str, figures: str) -> None:
     """The site's name, and a line of figures below it."""
     top = 1 - 0.38 / figure.get_figheight()
-    figure.text(0.04, top, title, fontsize=15, weight="bold", color=INK)
-    figure.text(0.04, top - 0.27 / figure.get_figheight(), figures, fontsize=9.5, color=INK)
+    figure.text(0.04, top, title, fontsize=15, weight="bold", color=INK, parse_math=False)
+    figure.text(0.04, top - 0.27 / figure.get_figheight(), figures, fontsize=9.5, color=INK, parse_math=False)
 
 
 def _round_down(length_m: float) -> float:

@@ -5,7 +5,12 @@ from pathlib import Path
 
 import pytest
 
-TREAT = Path(__file__).parents[2] / "docs/examples/treat.json"
+from oxbow.mission import read_mission
+from oxbow.site import Site
+from oxbow_cli import sheet
+
+EXAMPLES = Path(__file__).parents[2] / "docs/examples"
+TREAT, FLEET = EXAMPLES / "treat.json", EXAMPLES / "fleet.json"
 
 
 @pytest.fixture
@@ -50,3 +55,11 @@ def test_all_paths_are_drawn_with_their_names(oxbow, folder):
     drawn = (folder / "treated.svg").read_text()
     assert all(name in drawn for name in ("tern", "gull", "4 hot spots", "danger zone"))
     assert oxbow("picture", "treated.json", "--gaps", "-o", "gaps.svg").returncode == 0
+    assert "in half swaths of 5 m" in (folder / "gaps.svg").read_text()
+
+
+def test_the_start_that_a_vehicle_has_to_itself_is_drawn():
+    site = Site.of(read_mission(FLEET))
+    _, axes = sheet.new_sheet(site)
+    sheet.draw_ends(axes, site)
+    assert [text.get_text() for text in axes.texts] == ["launch and recovery", "coot: launch and recovery"]

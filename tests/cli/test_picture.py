@@ -12,6 +12,8 @@ from oxbow.errors import InvalidMission
 from oxbow.mission import mission_json, parse_mission, read_mission
 from oxbow.pipeline import plan_mission
 from oxbow.plan import PlanOptions
+from oxbow.site import Site
+from oxbow_cli import sheet
 from oxbow_cli.gaps import draw_gaps
 from oxbow_cli.local import local_call
 from oxbow_cli.picture import draw
@@ -60,6 +62,21 @@ def test_gaps_have_a_scale(planned, tmp_path):
     draw_gaps(planned, tmp_path / "gaps.svg")
     text = (tmp_path / "gaps.svg").read_text()
     assert f"in least radii of {planned.plan.certificate.least_radius_m:.3g} m" in text
+
+
+def test_a_name_is_plain_text(planned, tmp_path):
+    named = msgspec.structs.replace(planned, site_name=r"Lake $\frac{x$ of _1")
+    for draw_it in (draw, draw_gaps):
+        draw_it(named, tmp_path / "plan.svg")
+        assert r"Lake $\frac{x$ of _1" in (tmp_path / "plan.svg").read_text()
+
+
+def test_labels_cover_the_place_where_they_are_written():
+    _, axes = sheet.new_sheet(Site.of(SITE))
+    sheet.note(axes, (0.0, 0.0), "a label of some length", colour="black")
+    west, south, east, north = sheet.noted(axes).bounds
+    assert 0 < west < 0.1 * (east - west), "to the right of its place"
+    assert 0 < north - south < 0.2 * (east - west)
 
 
 def test_gaps_need_a_path(tmp_path):
