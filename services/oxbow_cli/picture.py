@@ -1,14 +1,21 @@
-"""A picture of a completed Mission File: the water, what keeps the paths off it, hot spots, and the paths."""
+"""A picture of a completed Mission File: the water, what keeps the paths off it, hot spots, and the paths.
+
+One path is coloured by its progress, so that its direction can be followed; the paths of several vehicles have a
+colour each. Marked are the ends of the paths, the widest gap of a survey, water that the plan leaves out, and hot
+spots that it does not treat.
+"""
 
 from __future__ import annotations
 
-from itertools import pairwise
+import math
+from itertools import cycle, pairwise
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from oxbow.contracts import FloatArray
 from oxbow.frame import lonlat
@@ -24,6 +31,7 @@ PROGRESS = "viridis"
 _COLOURS = 256
 FLEET = ("#2166ac", "#d6604d", "#1b7837", "#762a83", "#b35806", "#01665e", "#c51b7d", "#4d4d4d")
 """Colours of the vehicles of a fleet, in turn."""
+_KEY_ROWS = 3
 SPOT = "#f6c1b5"
 DANGER = "#d9822b"
 
@@ -57,7 +65,8 @@ def draw(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
         _draw_path(axes, paths[0], site.nominal_spacing_m)
         _draw_progress_key(figure)
     elif paths:
-        _draw_fleet(axes, mission, paths, site)
+        _draw_fleet(axes, paths, site.nominal_spacing_m)
+        _draw_names_key(figure, [planned.name for planned in mission.planned_paths])
     _draw_findings(axes, mission, site)
     sheet.draw_ends(axes, site)
     sheet.draw_scale_and_north(axes)
@@ -93,16 +102,11 @@ def _draw_path(axes: Axes, xy: FloatArray, spacing_m: float) -> None:
     )
 
 
-def _draw_fleet(axes: Axes, mission: Mission, paths: list[FloatArray], site: Site) -> None:
-    """The path of each vehicle in a colour of its own, and a key with the names."""
-    width = sheet.line_width(axes, site.nominal_spacing_m)
-    for number, (planned, xy) in enumerate(zip(mission.planned_paths, paths, strict=True)):
-        axes.plot(*xy.T, color=FLEET[number % len(FLEET)], linewidth=width, label=planned.name, zorder=4)
+def _draw_fleet(axes: Axes, paths: list[FloatArray], spacing_m: float) -> None:
+    """The path of each vehicle in a colour of its own."""
+    for xy, colour in zip(paths, cycle(FLEET)):
+        axes.plot(*xy.T, color=colour, linewidth=sheet.line_width(axes, spacing_m), zorder=4)
     axes.autoscale(False)
-    key = axes.legend(
-        loc="upper left", bbox_to_anchor=(0.03, 0.99), fontsize=8, frameon=False, labelcolor=INK, handlelength=1.5
-    )
-    key.set_zorder(8)
 
 
 def _pieces(xy: FloatArray) -> list[FloatArray]:
@@ -118,15 +122,20 @@ def _pieces(xy: FloatArray) -> list[FloatArray]:
 
 
 def _draw_findings(axes: Axes, mission: Mission, site: Site) -> None:
-    """What the plan says it leaves out, and the disc that its worst gap would hold."""
+    """What the plan says it leaves out, and the disc that a survey's widest gap would hold."""
     if mission.plan is None:
         return
     for part in mission.plan.dropped:
         place = site.frame.to_planar(lonlat([part.place]))[0]
         axes.plot(*place, marker="x", markersize=7, markeredgewidth=1.8, color=GAP, zorder=6)
         sheet.note(axes, (place[0], place[1]), f"dropped {sheet.area_text(part.area_m2)}", colour=GAP)
+    untreated = _untreated(mission.plan.treatment)
+    for spot in (spot for spot in site.hot_spots if spot.name in untreated):
+        place = spot.area.representative_point()
+        sheet.note(axes, (place.x, place.y), f"{spot.name}: not treated", colour=GAP)
     certificate = mission.plan.certificate
-    if certificate.worst_gap is not None:
+    # Of a treatment, half a swath is what every pass leaves on either side.
+    if certificate.worst_gap is not None and mission.mission_type is not MissionType.TREAT:
         x, y = site.frame.to_planar(lonlat([certificate.worst_gap]))[0]
         radius_m = certificate.cover_radius_m[0]
         sheet.draw_disc(axes, (x, y), radius_m)
@@ -137,6 +146,26 @@ def _draw_progress_key(figure: Figure) -> None:
     key = sheet.add_key(figure, 0.74, 0.14, PROGRESS)
     for x, text, side in ((-0.04, "start", "right"), (1.04, "end", "left")):
         key.text(x, 0.5, text, transform=key.transAxes, ha=side, va="center", fontsize=8, color=INK)
+
+
+def _draw_names_key(figure: Figure, names: list[str]) -> None:
+    """The colours of the vehicles, in the footer, where they hide no water."""
+    lines = [Line2D([], [], color=colour) for _, colour in zip(names, cycle(FLEET))]
+    key = figure.legend(
+        lines,
+        [""] * len(names),
+        loc="lower right",
+        bbox_to_anchor=(0.97, 0.1 / figure.get_figheight()),
+        ncols=math.ceil(len(names) / _KEY_ROWS),
+        frameon=False,
+        fontsize=8,
+        labelcolor=INK,
+        handlelength=1.5,
+        labelspacing=0.3,
+    )
+    for text, name in zip(key.get_texts(), names, strict=True):
+        text.set_parse_math(False)
+        text.set_text(name)
 
 
 def _figures(mission: Mission) -> str:
@@ -159,5 +188,11 @@ def _figures(mission: Mission) -> str:
 
 
 def _treated(treatment: TreatmentRecord) -> str:
-    treated = sum(spot.treated_share > 0 for spot in treatment.hot_spots)
-    return f"{treated} of {len(treatment.hot_spots)} hot spots treated"
+    count = len(treatment.hot_spots)
+    return f"{count - len(_untreated(treatment))} of {count} hot spots treated"
+
+
+def _untreated(treatment: TreatmentRecord | None) -> set[str]:
+    """The names of the hot spots of which no part is treated."""
+    spots = () if treatment is None else treatment.hot_spots
+    return {spot.hot_spot for spot in spots if spot.treated_share == 0.0}
