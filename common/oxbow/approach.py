@@ -88,8 +88,8 @@ class Approach:
         if self._legs_m <= FAR * range_m:
             return ()
         return (
-            f"the way to its share and home takes {self._legs_m / range_m:.0%} of its {range_m:.0f} m: it surveys the"
-            " share at a wider spacing; start it nearer, or give it more length",
+            f"the way to its share and home takes {self._legs_m / range_m:.0%} of its {range_m:.0f} m: it surveys"
+            " the share at a wider spacing; start it nearer, or give it more length",
         )
 
     @property
