@@ -17,7 +17,8 @@ from oxbow.route.channel import Channel
 from oxbow.route.funnel import funnel_line
 from oxbow.route.incenters import incenters
 from oxbow.route.mesh import Mesh
-from oxbow.route.tessellation import RINGS, TessellationRouter, lattice
+from oxbow.route.network import NetworkRouter
+from oxbow.route.tessellation import RINGS, Tessellation, lattice
 from oxbow.testing import nasty_polygons
 
 ROUNDING_M = 1e-6
@@ -167,7 +168,8 @@ def test_reduced_ways_over_the_lattice_are_nearly_exact(seed):
     water = scene(seed, obstacles=4)
     points = places_in(water, 6, seed)
     exact = make_router(RouteMethod.VISIBILITY, water).distances(points)
-    near = TessellationRouter(Mesh.of(water), side_m=1.5).distances(points)
+    fine = Tessellation(Mesh.of(water), side_m=1.5)
+    near = NetworkRouter(fine, RouteMethod.TESSELLATION, fine.reduced).distances(points)
     off = ~np.eye(len(points), dtype=bool)
     assert (near[off] <= 1.015 * exact[off]).all()
 
@@ -176,7 +178,7 @@ def test_a_lattice_needs_a_side():
     mesh = Mesh.of(box(0, 0, 100, 100))
     for side_m in (0.0, -1.0, np.nan, np.inf, 0.01):
         with pytest.raises(InvalidMission, match=r"side_m: is .*expected a finite number >= 0\.1"):
-            TessellationRouter(mesh, side_m=side_m)
+            Tessellation(mesh, side_m=side_m)
 
 
 # ---------------------------------------------------------------------------- channels

@@ -44,6 +44,10 @@ class Touches:
         chosen = rank[self.place] >= 0
         return Touches(rank[self.place[chosen]], self.triangle[chosen])
 
+    def sides(self) -> tuple[Indices, Indices]:
+        """Pairs of a place and a side of a triangle that it touches."""
+        return np.repeat(self.place, 3), (3 * self.triangle[:, None] + np.arange(3)).ravel()
+
     def companions(self) -> tuple[Indices, Indices]:
         """Ordered pairs of places that touch the same triangle; a pair may occur repeatedly."""
         order = np.argsort(self.triangle, kind="stable")

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from shapely import MultiPolygon, Polygon
 
-from oxbow.route.channel import ChannelRouter
+from oxbow.route.channel import Gates
 from oxbow.route.danger import NO_DANGER, Danger
 from oxbow.route.funnel import funnel_line
 from oxbow.route.incenters import incenter_line
 from oxbow.route.mesh import Mesh
+from oxbow.route.network import NetworkRouter
 from oxbow.route.route import RouteMethod, Router
-from oxbow.route.tessellation import TessellationRouter
-from oxbow.route.visibility import VisibilityRouter
+from oxbow.route.tessellation import Tessellation
+from oxbow.route.visibility import VisibilityGraph
 
 __all__ = ["make_router", "router_on"]
 
@@ -40,10 +41,11 @@ def router_on(mesh: Mesh, method: RouteMethod, danger: Danger) -> Router:
     """The router of one method on triangulated water."""
     match method:
         case RouteMethod.VISIBILITY:
-            return VisibilityRouter(mesh, danger)
+            return NetworkRouter(VisibilityGraph(mesh, danger), method)
         case RouteMethod.TESSELLATION:
-            return TessellationRouter(mesh, danger)
-        case RouteMethod.FUNNEL:
-            return ChannelRouter(mesh, danger, drawn=funnel_line, method=method)
-        case RouteMethod.INCENTERS:
-            return ChannelRouter(mesh, danger, drawn=incenter_line, method=method)
+            tessellation = Tessellation(mesh, danger)
+            return NetworkRouter(tessellation, method, tessellation.reduced)
+        case RouteMethod.FUNNEL | RouteMethod.INCENTERS:
+            gates = Gates(mesh, danger)
+            line = funnel_line if method is RouteMethod.FUNNEL else incenter_line
+            return NetworkRouter(gates, method, lambda way: line(gates.channel(way)))

@@ -13,21 +13,10 @@ import numpy.typing as npt
 from shapely import LineString
 
 from oxbow.contracts import FloatArray
-from oxbow.errors import Infeasible, InvalidMission
 from oxbow.route.danger import Danger
 from oxbow.route.mesh import Mesh
 
-__all__ = [
-    "Route",
-    "RouteMethod",
-    "Router",
-    "as_matrix",
-    "checked_ends",
-    "checked_places",
-    "judged",
-    "place_names",
-    "require_way",
-]
+__all__ = ["Route", "RouteMethod", "Router", "judged"]
 
 
 class RouteMethod(enum.StrEnum):
@@ -125,58 +114,3 @@ def _without_repeats(polyline: FloatArray) -> FloatArray:
     repeated = (polyline[1:] == polyline[:-1]).all(axis=1)
     kept = polyline[np.concatenate([[True], ~repeated])]
     return kept if len(kept) > 1 else np.vstack([kept, kept])
-
-
-def place_names(count: int) -> list[str]:
-    """What errors call the places of a distance matrix."""
-    return [f"points[{number}]" for number in range(count)]
-
-
-def checked_places(places: npt.ArrayLike) -> FloatArray:
-    """Places as an array of shape (n, 2).
-
-    Raises
-    ------
-    InvalidMission
-        They have another shape.
-    """
-    array = np.asarray(places, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] != 2:
-        raise InvalidMission(f"have shape {array.shape}; expected places of shape (n, 2)", where="points")
-    return array
-
-
-def checked_ends(start: npt.ArrayLike, goal: npt.ArrayLike) -> FloatArray:
-    """Start and goal as an array of shape (2, 2).
-
-    Raises
-    ------
-    InvalidMission
-        One of them is not one place.
-    """
-    ends = [np.asarray(place, dtype=np.float64) for place in (start, goal)]
-    for place, name in zip(ends, ("start", "goal"), strict=True):
-        if place.shape != (2,):
-            raise InvalidMission(f"has shape {place.shape}; expected one place (x, y)", where=name)
-    return np.stack(ends)
-
-
-def require_way(cost: float, ends: FloatArray) -> None:
-    """Refuse a goal that no way leads to.
-
-    Raises
-    ------
-    Infeasible
-        The cost is infinite.
-    """
-    if not math.isfinite(cost):
-        start, goal = (f"({x:.6g}, {y:.6g})" for x, y in ends)
-        raise Infeasible(f"at {goal} is in other water than the start at {start}: no way leads there", "goal")
-
-
-def as_matrix(costs: FloatArray, points: FloatArray, danger: Danger) -> FloatArray:
-    """The symmetric matrix of the costs of ways between points; starting inside a danger zone costs as well."""
-    matrix = costs + danger.c_max_m * danger.hazards_at(points)[:, None]
-    matrix = np.minimum(matrix, matrix.T)
-    np.fill_diagonal(matrix, 0.0)
-    return matrix

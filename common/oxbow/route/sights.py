@@ -72,8 +72,7 @@ def sights(mesh: Mesh, eyes: FloatArray, at: Touches, places: FloatArray, sought
     """
     by_triangle = np.argsort(sought.triangle, kind="stable")
     held = Touches(sought.place[by_triangle], sought.triangle[by_triangle])
-    around = 3 * at.triangle[:, None] + np.arange(3)
-    found_corners = [_counted(np.repeat(at.place, 3), around.ravel(), wanted)]
+    found_corners = [_counted(*at.sides(), wanted)]
     eye_at, place = _held(at.triangle, held)
     found_places = [(at.place[eye_at], place)]
     cones = _first_cones(mesh, eyes, at)
@@ -94,8 +93,7 @@ def _counted(eye: Indices, corner: Indices, wanted: Mask) -> tuple[Indices, Indi
 
 def _first_cones(mesh: Mesh, eyes: FloatArray, at: Touches) -> _Cones:
     """From each triangle that an eye looks out of, through the sides that it does not lie on."""
-    eye = np.repeat(at.place, 3)
-    side = (3 * at.triangle[:, None] + np.arange(3)).ravel()
+    eye, side = at.sides()
     right, left = mesh.tails[side] - eyes[eye], mesh.heads[side] - eyes[eye]
     through = _is_left(left, of=right) & (mesh.twins[side] >= 0)
     return _Cones(eye[through], mesh.twins[side[through]], right[through], left[through])

@@ -15,31 +15,20 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import KDTree
 
 from oxbow.contracts import FloatArray
 from oxbow.errors import InvalidMission
 from oxbow.route.danger import NO_DANGER, Danger
 from oxbow.route.mesh import ROUNDING_M, Mesh, Touches
-from oxbow.route.route import (
-    Route,
-    RouteMethod,
-    as_matrix,
-    checked_ends,
-    checked_places,
-    judged,
-    place_names,
-    require_way,
-)
-from oxbow.route.search import Arcs, Ways, cheapest_ways, distinct
+from oxbow.route.network import Ends, Links, Way
+from oxbow.route.search import Arcs, cheapest_ways
 from oxbow.route.sights import sights
 from oxbow.triangles import Indices, following
 
-__all__ = ["RINGS", "TessellationRouter", "lattice"]
+__all__ = ["RINGS", "Tessellation", "lattice"]
 
 SIDES_ACROSS = 60
 """How many sides of the lattice fit the longer side of the water's box, where nothing else is asked for."""
@@ -95,8 +84,8 @@ def lattice(
     return places, np.vstack(pairs)
 
 
-class TessellationRouter:
-    """Routes over a lattice, reduced.
+class Tessellation:
+    """The network of the water's vertices and a lattice, and how ways over it are reduced.
 
     Parameters
     ----------
@@ -122,27 +111,50 @@ class TessellationRouter:
         self.danger = danger
         self.side_m = across_m / SIDES_ACROSS if side_m is None else side_m
 
-    def route(self, start: npt.ArrayLike, goal: npt.ArrayLike) -> Route:
-        """The reduced route; see `Router.route`."""
-        ends = checked_ends(start, goal)
-        network = self._network(ends, ["start", "goal"])
-        require_way(network.ways.costs[0, network.arrival + 1], ends)
-        return judged(self._reduced(network, 0, 1), self.mesh, self.danger, RouteMethod.TESSELLATION)
-
-    def distances(self, points: npt.ArrayLike) -> FloatArray:
-        """Costs of the reduced routes from each place to those after it; see `Router.distances`."""
-        points = checked_places(points)
-        network = self._network(points, place_names(len(points)))
-        costs = np.full((len(points), len(points)), np.inf)
-        for i, j in combinations(range(len(points)), 2):
-            if np.isfinite(network.ways.costs[i, network.arrival + j]):
-                line = self._reduced(network, i, j)
-                costs[i, j] = self.danger.costs(line[:-1], line[1:]).sum()
-        return as_matrix(costs, points, self.danger)
+    @cached_property
+    def places(self) -> FloatArray:
+        """See `Network.places`: the vertices, once for each sector, then the lattice."""
+        return np.vstack([self._vertices, self._lattice.places])
 
     @cached_property
-    def _lattice(self) -> tuple[FloatArray, Touches, Indices]:
-        """The lattice in the water: its places, their triangles, and pairs that no shore parts."""
+    def arcs(self) -> Arcs:
+        """See `Network.arcs`: along the sides of triangles, from vertices to the lattice, and within that."""
+        vertices, sectors = self._vertices, self.mesh.sectors
+        along_sides = np.column_stack([sectors, sectors[following(np.arange(len(sectors)))]])
+        vertex, near = self._near(vertices)
+        # Where shores touch, a line that ends there does not tell from which side.
+        alone = KDTree(vertices).query_ball_point(vertices, ROUNDING_M, return_length=True) == 1
+        links = np.column_stack([vertex, near])[alone[vertex]]
+        pairs = np.vstack([along_sides, links, len(vertices) + self._lattice.pairs])
+        return Arcs.both_ways(self.places, pairs, self.danger)
+
+    def links(self, ends: Ends) -> Links:
+        """See `Network.links`: to the lattice near, and to the corners of the triangles that ends touch."""
+        (near_end, near), (end, corner) = self._near(ends.places), ends.at.sides()
+        beside = np.concatenate([near, self.mesh.sectors[corner]])
+        return Links(np.concatenate([near_end, end]), beside, beside, *ends.at.companions())
+
+    def reduced(self, way: Way) -> FloatArray:
+        """The cheapest polyline along the lines of sight between the places of a way."""
+        places = np.vstack([way.start, self.places[way.nodes], way.goal])
+        ends, inner = way.ends.at, self._touches.among(way.nodes)
+        last = len(places) - 1
+        touches = Touches(last * ends.place, ends.triangle) + Touches(1 + inner.place, inner.triangle)
+        nothing = np.zeros(len(self.mesh.tails), dtype=np.bool_)
+        seen = sights(self.mesh, places, touches, places, touches, nothing)
+        pairs = np.column_stack([seen.place_eyes, seen.places])
+        ways = cheapest_ways(len(places), Arcs.both_ways(places, pairs, self.danger), np.array([0]))
+        return np.asarray(places[ways.way(0, last)])
+
+    @cached_property
+    def _vertices(self) -> FloatArray:
+        vertices = np.empty((self.mesh.sectors.max() + 1, 2))
+        vertices[self.mesh.sectors] = self.mesh.tails
+        return vertices
+
+    @cached_property
+    def _lattice(self) -> _Lattice:
+        """The lattice in the water."""
         places, pairs = lattice(self.mesh.points.min(axis=0), self.mesh.points.max(axis=0), self.side_m)
         touches = self.mesh.holding(places)
         wet = np.unique(touches.place)
@@ -151,92 +163,32 @@ class TessellationRouter:
         pairs = rank[pairs[(rank[pairs] >= 0).all(axis=1)]]
         places = places[wet]
         clear = self.mesh.is_clear(places[pairs[:, 0]], places[pairs[:, 1]])
-        return places, touches.among(wet), pairs[clear]
+        return _Lattice(places, touches.among(wet), pairs[clear])
 
     @cached_property
     def _index(self) -> KDTree:
-        return KDTree(self._lattice[0])
+        return KDTree(self._lattice.places)
 
     @cached_property
-    def _base(self) -> _Base:
-        """What does not depend on the ends of routes: the water's vertices, then the lattice."""
-        mesh = self.mesh
-        vertices = np.empty((mesh.sectors.max() + 1, 2))
-        vertices[mesh.sectors] = mesh.tails
-        places, touches, pairs = self._lattice
-        sides = np.arange(len(mesh.sectors))
-        along_sides = np.column_stack([mesh.sectors, mesh.sectors[following(sides)]])
-        vertex, near = self._links(vertices)
-        # Where shores touch, a line that ends there does not tell from which side.
-        alone = KDTree(vertices).query_ball_point(vertices, ROUNDING_M, return_length=True) == 1
-        links = np.column_stack([vertex, len(vertices) + near])[alone[vertex]]
-        all_places = np.vstack([vertices, places])
-        all_pairs = np.vstack([along_sides, links, len(vertices) + pairs])
-        return _Base(
-            places=all_places,
-            touches=Touches(mesh.sectors, sides // 3) + Touches(len(vertices) + touches.place, touches.triangle),
-            arcs=Arcs.both_ways(all_places, all_pairs, self.danger),
-        )
+    def _touches(self) -> Touches:
+        """The triangles that the network's places touch."""
+        sectors, touches = self.mesh.sectors, self._lattice.touches
+        on_lattice = Touches(len(self._vertices) + touches.place, touches.triangle)
+        return Touches(sectors, np.arange(len(sectors)) // 3) + on_lattice
 
-    def _links(self, places: FloatArray) -> tuple[Indices, Indices]:
-        """Pairs of a place and a lattice vertex near it with no shore between, but for one at the place itself."""
-        near = KDTree(places).sparse_distance_matrix(self._index, REACH * self.side_m, output_type="ndarray")
-        owner, vertex = near["i"], near["j"]
-        from_lattice = self._lattice[0][vertex]
-        clear = self.mesh.is_clear(from_lattice, places[owner] + SHORT * (from_lattice - places[owner]))
-        return owner[clear], vertex[clear]
-
-    def _network(self, points: FloatArray, names: list[str]) -> _Network:
-        """The base and some points: those to depart from, then those to arrive at."""
-        mesh, base = self.mesh, self._base
-        at = mesh.touches(points, names)
-        departure = len(base.places)
-        arrival = departure + len(points)
-        lattice_from = departure - len(self._lattice[0])
-        linked, near = self._links(points)
-        corner = (3 * at.triangle[:, None] + np.arange(3)).ravel()
-        point = np.concatenate([linked, np.repeat(at.place, 3)])
-        point, beside = distinct(point, np.concatenate([lattice_from + near, mesh.sectors[corner]]))
-        first, second = at.companions()
-        places = np.vstack([base.places, points, points])
-        arcs = base.arcs
-        for tails, heads in (
-            (departure + point, beside),
-            (beside, arrival + point),
-            distinct(departure + first, arrival + second),
-        ):
-            arcs += Arcs.one_way(places, tails, heads, self.danger)
-        touches = base.touches
-        for own in (departure, arrival):
-            touches += Touches(own + at.place, at.triangle)
-        ways = cheapest_ways(len(places), arcs, np.arange(departure, arrival))
-        return _Network(places, touches, arrival, ways)
-
-    def _reduced(self, network: _Network, start: int, goal: int) -> FloatArray:
-        """The cheapest polyline along the lines of sight between the vertices of the way found."""
-        way = np.array(network.ways.way(start, network.arrival + goal))
-        places, touches = network.places[way], network.touches.among(way)
-        nothing = np.zeros(self.mesh.tails.shape[0], dtype=np.bool_)
-        seen = sights(self.mesh, places, touches, places, touches, nothing)
-        pairs = np.column_stack([seen.place_eyes, seen.places])
-        ways = cheapest_ways(len(way), Arcs.both_ways(places, pairs, self.danger), np.array([0]))
-        return np.asarray(places[ways.way(0, len(way) - 1)])
+    def _near(self, points: FloatArray) -> tuple[Indices, Indices]:
+        """Pairs of a point and a place of the lattice near it with no shore between, but for one at the point."""
+        near = KDTree(points).sparse_distance_matrix(self._index, REACH * self.side_m, output_type="ndarray")
+        owner, place = near["i"], near["j"]
+        from_lattice = self._lattice.places[place]
+        clear = self.mesh.is_clear(from_lattice, points[owner] + SHORT * (from_lattice - points[owner]))
+        return owner[clear], len(self._vertices) + place[clear]
 
 
 @dataclass(frozen=True)
-class _Base:
-    """Vertices of the water and the lattice, joined."""
+class _Lattice:
+    """Places of the lattice in the water, the triangles that they touch, and pairs that no shore parts."""
 
     places: FloatArray
     touches: Touches
-    arcs: Arcs
-
-
-@dataclass(frozen=True)
-class _Network:
-    """What a search between points found; arrivals are numbered from `arrival`."""
-
-    places: FloatArray
-    touches: Touches
-    arrival: int
-    ways: Ways
+    pairs: Indices

@@ -14,35 +14,26 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
 from oxbow.contracts import FloatArray
 from oxbow.route.danger import NO_DANGER, Danger
 from oxbow.route.mesh import Mesh, Touches
-from oxbow.route.route import (
-    Route,
-    RouteMethod,
-    as_matrix,
-    checked_ends,
-    checked_places,
-    judged,
-    place_names,
-    require_way,
-)
-from oxbow.route.search import Arcs, cheapest_ways, distinct
+from oxbow.route.network import Ends, Links
+from oxbow.route.search import Arcs
 from oxbow.route.sights import IN_LINE, Mask, sights
 from oxbow.triangles import Indices, cross, following
 
-__all__ = ["VisibilityRouter"]
+__all__ = ["VisibilityGraph"]
 
 STRAIGHT_RAD = math.pi - 1e-9
 """A corner of the water at least this wide is one that routes may touch."""
 
 
-class VisibilityRouter:
-    """Shortest routes, exact but for rounding.
+@dataclass(frozen=True)
+class VisibilityGraph:
+    """The network of shortest routes, exact but for rounding.
 
-    With danger zones, the cheapest of the routes that bend at corners of the shore and of the zones.
+    With danger zones, ways are the cheapest of those that bend at corners of the shore and of the zones.
 
     Parameters
     ----------
@@ -52,57 +43,22 @@ class VisibilityRouter:
         What danger there is.
     """
 
-    def __init__(self, mesh: Mesh, danger: Danger = NO_DANGER) -> None:
-        self.mesh = mesh
-        self.danger = danger
-
-    def route(self, start: npt.ArrayLike, goal: npt.ArrayLike) -> Route:
-        """The shortest route; see `Router.route`."""
-        ends = checked_ends(start, goal)
-        places, arcs = self._network(ends, ["start", "goal"])
-        departure, arrival = len(places) - 4, len(places) - 1
-        ways = cheapest_ways(len(places), arcs, np.array([departure]))
-        require_way(ways.costs[0, arrival], ends)
-        return judged(places[ways.way(0, arrival)], self.mesh, self.danger, RouteMethod.VISIBILITY)
-
-    def distances(self, points: npt.ArrayLike) -> FloatArray:
-        """Costs of the shortest routes between all pairs; see `Router.distances`."""
-        points = checked_places(points)
-        places, arcs = self._network(points, place_names(len(points)))
-        departures, arrivals = np.arange(len(places))[-2 * len(points) :].reshape(2, -1)
-        costs = cheapest_ways(len(places), arcs, departures).costs[:, arrivals]
-        return as_matrix(costs, points, self.danger)
-
-    def _network(self, points: FloatArray, names: list[str]) -> tuple[FloatArray, Arcs]:
-        """The visibility graph and some points: bends, then the points to depart from, then those to arrive at.
-
-        A point where shores touch is in the water of both sides, but no way leads through it.
-        """
-        at = self.mesh.touches(points, names)
-        seen = sights(self.mesh, points, at, points, at, self.bends.at_corner >= 0)
-        bend = self.bends.at_corner[seen.corners]
-        useful = self.bends.can_be_reached(points[seen.corner_eyes], bend)
-        point, bend = distinct(seen.corner_eyes[useful], bend[useful])
-        departure = len(self.bends.places)
-        arrival = departure + len(points)
-        places = np.vstack([self.bends.places, points, points])
-        arcs = self._arcs
-        for tails, heads in (
-            (departure + point, bend),
-            (bend, arrival + point),
-            distinct(departure + seen.place_eyes, arrival + seen.places),
-        ):
-            arcs += Arcs.one_way(places, tails, heads, self.danger)
-        return places, arcs
+    mesh: Mesh
+    danger: Danger = NO_DANGER
 
     @cached_property
     def bends(self) -> Bends:
         """Where routes can bend."""
         return Bends.of(self.mesh, any_turn=bool(self.danger.zones))
 
+    @property
+    def places(self) -> FloatArray:
+        """See `Network.places`."""
+        return self.bends.places
+
     @cached_property
-    def _arcs(self) -> Arcs:
-        """The visibility graph of the bends."""
+    def arcs(self) -> Arcs:
+        """See `Network.arcs`: between bends that see each other."""
         bends = self.bends
         nobody = np.empty(0, dtype=np.intp)
         at = Touches(bends.at_corner[bends.corners], bends.corners // 3)
@@ -111,6 +67,17 @@ class VisibilityRouter:
         a, b = seen.corner_eyes, bends.at_corner[seen.corners]
         useful = bends.can_be_reached(bends.places[a], b) & bends.can_be_reached(bends.places[b], a)
         return Arcs.both_ways(bends.places, np.column_stack([a, b])[useful], self.danger)
+
+    def links(self, ends: Ends) -> Links:
+        """See `Network.links`: what ends see.
+
+        A place where shores touch is in the water of both sides, but no way leads through it.
+        """
+        seen = sights(self.mesh, ends.places, ends.at, ends.places, ends.at, self.bends.at_corner >= 0)
+        bend = self.bends.at_corner[seen.corners]
+        useful = self.bends.can_be_reached(ends.places[seen.corner_eyes], bend)
+        bend = bend[useful]
+        return Links(seen.corner_eyes[useful], bend, bend, seen.place_eyes, seen.places)
 
 
 @dataclass(frozen=True)
