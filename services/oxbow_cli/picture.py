@@ -77,10 +77,9 @@ def draw(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
 def _draw_danger(axes: Axes, site: Site) -> None:
     """Danger zones, as far as they are water, hatched, with their names and dangers."""
     style = {"facecolor": "none", "edgecolor": DANGER, "hatch": r"\\\\", "linewidth": 0.8, "zorder": 3.5}
-    for number, zone in enumerate(site.danger_zones):
+    for zone in site.danger_zones:
         water = zone.area.intersection(site.outline)
-        in_key = "_another" if number else "danger zone"
-        axes.add_patch(sheet.patch(water, label=in_key, **style))
+        axes.add_patch(sheet.patch(water, **style))
         place = water.representative_point()
         text = f"{zone.name}: danger {zone.probability:g} a {zone.per}"
         sheet.note(axes, (place.x, place.y), text, colour=DANGER)

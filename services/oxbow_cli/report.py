@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from oxbow.contracts import Conformance, MissionState
+from oxbow.contracts import Conformance, Measures, Method, MissionState
 from oxbow.frame import Position
 
 if TYPE_CHECKING:
@@ -84,31 +84,60 @@ def print_plan(planned: Planned, file: Path) -> None:
 def _plan_table(site: str, plan: PlanRecord) -> Table:
     """A plan in the measures that its user asks for first."""
     certificate = plan.certificate
-    treats_only = plan.treatment is not None and plan.slave_certificate is None
-    water = "hot spots" if treats_only else "water"
     rows = [
-        ("method", f"{plan.method}, seed {plan.seed}"),
-        ("heading", "-" if plan.heading_deg is None else f"{plan.heading_deg % 180:.1f} deg"),
-        ("spacing", f"{plan.spacing_m:.1f} m"),
+        *(() if plan.mission_id is None else [("mission", f"{plan.mission_id}, revision {plan.revision}")]),
+        *(_survey_rows(plan) if _surveys(plan) else _treatment_rows(plan)),
         ("length", f"{_length(plan.length_m)} of {_length(plan.max_length_m)} ({_share(plan)})"),
         ("duration", _duration(plan.duration_s)),
         ("waypoints", f"{certificate.waypoints}"),
-        (
-            water,
-            f"{certificate.free_area_m2 / 1e6:.3f} km2, {certificate.judged_area:.1%} in parts that it enters",
-        ),
-        *_quality(certificate.cover_radius_m, certificate.least_radius_m, certificate.q, certificate.p95_ratio),
+        *(_quality_rows(certificate) if _surveys(plan) else _reach_rows(plan)),
         # A way home may cross the way out where hot spots are treated between them.
-        ("conforms", _conformance(None if treats_only else certificate.is_simple, certificate)),
+        ("conforms", _conformance(certificate.is_simple if _surveys(plan) else None, certificate)),
+        *(
+            ()
+            if certificate.danger is None
+            else [("danger", f"{certificate.danger:.1%} probability of harm on the way")]
+        ),
+        *_fleet_rows(plan),
+        *(("dropped", text) for text in _dropped(plan)),
+        *(("warning", warning) for warning in plan.warnings),
     ]
-    if certificate.danger is not None:
-        rows.append(("danger", f"{certificate.danger:.1%} probability of harm on the way"))
-    if plan.mission_id is not None:
-        rows.insert(0, ("mission", f"{plan.mission_id}, revision {plan.revision}"))
-    rows += _fleet_rows(plan)
-    rows += [("dropped", text) for text in _dropped(plan)]
-    rows += [("warning", warning) for warning in plan.warnings]
     return _table(f"Plan of {site}", rows)
+
+
+def _surveys(plan: PlanRecord) -> bool:
+    """Whether the plan's own figures are those of a survey; else, they are a treatment's."""
+    return plan.treatment is None or plan.slave_certificate is not None
+
+
+def _survey_rows(plan: PlanRecord) -> Rows:
+    yield "method", f"{plan.method}, seed {plan.seed}"
+    if plan.method is Method.TRANSECT:
+        several = "each share its own"
+        yield "heading", several if plan.heading_deg is None else f"{plan.heading_deg % 180:.1f} deg"
+    yield "spacing", f"{plan.spacing_m:.1f} m"
+
+
+def _treatment_rows(plan: PlanRecord) -> Rows:
+    yield "method", f"passes over hot spots, seed {plan.seed}"
+    yield "swath", f"{plan.spacing_m:.1f} m"
+
+
+def _quality_rows(found: Measures) -> Rows:
+    low_m, high_m = found.cover_radius_m
+    yield "water", f"{found.free_area_m2 / 1e6:.3f} km2, {found.judged_area:.1%} in parts that it enters"
+    yield (
+        "farthest water",
+        f"{low_m:.1f} to {high_m:.1f} m from the path; least possible {found.least_radius_m:.1f} m",
+    )
+    yield "q", f"{found.q:.2f} (farthest / least possible); {found.p95_ratio:.2f} for 95 % of the water"
+
+
+def _reach_rows(plan: PlanRecord) -> Rows:
+    """How far from the passes the hot spots reach; no path of that length could be a measure for it."""
+    low_m, high_m = plan.certificate.cover_radius_m
+    text = f"{low_m:.1f} to {high_m:.1f} m from a pass; half a swath is {plan.spacing_m / 2:.1f} m"
+    yield "farthest treated", text
 
 
 def _fleet_rows(plan: PlanRecord) -> Rows:
@@ -217,12 +246,6 @@ def _table(title: str, rows: Rows) -> Table:
     for name, text in rows:
         table.add_row(name, text)
     return table
-
-
-def _quality(radius_m: tuple[float, float], least_m: float, q: float, p95_ratio: float) -> Rows:
-    low_m, high_m = radius_m
-    yield "farthest water", f"{low_m:.1f} to {high_m:.1f} m from the path; least possible {least_m:.1f} m"
-    yield "q", f"{q:.2f} (farthest / least possible); {p95_ratio:.2f} for 95 % of the water"
 
 
 def _conformance(is_simple: bool | None, found: Conformance) -> str:

@@ -8,6 +8,7 @@ import pytest
 from oxbow.mission import read_mission
 from oxbow.site import Site
 from oxbow_cli import sheet
+from oxbow_cli.picture import DANGER
 
 EXAMPLES = Path(__file__).parents[2] / "docs/examples"
 TREAT, FLEET = EXAMPLES / "treat.json", EXAMPLES / "fleet.json"
@@ -25,6 +26,9 @@ def test_the_table_tells_what_each_vehicle_does_and_what_is_left(treated):
     assert "treats features[0]" in treated
     assert "100.0% treated" in treated
     assert "further sortie" in treated
+    assert "passes over hot spots" in treated
+    assert "half a swath is 5.0 m" in treated
+    assert "least possible" not in treated
     assert "danger 0.0%" in treated
     assert "0.0% probability of harm" in treated
 
@@ -53,7 +57,8 @@ def test_a_path_of_a_vehicle_that_takes_no_part_is_named(oxbow, folder):
 def test_all_paths_are_drawn_with_their_names(oxbow, folder):
     assert oxbow("picture", "treated.json", "-o", "treated.svg").returncode == 0
     drawn = (folder / "treated.svg").read_text()
-    assert all(name in drawn for name in ("tern", "gull", "4 hot spots", "danger zone"))
+    assert all(text in drawn for text in ("tern", "gull", "3 of 4 hot spots treated", DANGER))
+    assert "widest gap" not in drawn
     assert oxbow("picture", "treated.json", "--gaps", "-o", "gaps.svg").returncode == 0
     assert "in half swaths of 5 m" in (folder / "gaps.svg").read_text()
 

@@ -15,6 +15,11 @@ def test_completes_the_file_and_keeps_what_it_does_not_know(oxbow, folder):
     assert mission["Plan"]["method"] == "SpaceFillingCurve"
 
 
+def test_only_transects_have_a_heading(oxbow):
+    assert "heading" not in oxbow("plan", "pond.json", "--local", "-o", "curve.json").stdout
+    assert "heading" in oxbow("plan", "pond.json", "--local", "-o", "legs.json", "--method", "Transect").stdout
+
+
 def test_a_name_is_plain_text(oxbow, folder, pond):
     (folder / "pond.json").write_text(json.dumps(pond(SiteName="Pond [red] :fish: [/]")))
     assert "Plan of Pond [red] :fish: [/]" in oxbow("plan", "pond.json", "--local").stdout
