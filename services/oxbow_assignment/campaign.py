@@ -168,11 +168,14 @@ def _out_of_reach(treatments: Sequence[Treatment], division: Division, fleet: Fl
 
 def _leg_warnings(fleet: Fleet) -> Iterator[str]:
     for slave, out, home in zip(fleet.slaves, fleet.out, fleet.home, strict=True):
-        for leg, which in ((out, "start"), (home, "recovery")):
+        legs = {"start": out, "recovery": home}
+        if slave.start == slave.recovery:
+            legs = {"start and recovery": out}
+        for which, leg in legs.items():
             if leg.length > 0.0:
                 yield (
-                    f"{which} of vehicle {slave.name!r} lies outside the free space: its leg of {leg.length:.0f} m"
-                    " is straight"
+                    f"the leg of {leg.length:.0f} m between the free space and {which} of vehicle {slave.name!r} is"
+                    " straight, whatever lies there"
                 )
 
 

@@ -166,8 +166,8 @@ def test_starts_ashore_have_straight_legs():
     assert found.sorties[0].path.coords[:2] == [(-50.0, 300.0), (0.0, 300.0)]
     assert found.sorties[0].path.coords[-2:] == [(1_000.0, 300.0), (1_020.0, 300.0)]
     assert found.warnings == (
-        "start of vehicle 'boat' lies outside the free space: its leg of 50 m is straight",
-        "recovery of vehicle 'boat' lies outside the free space: its leg of 20 m is straight",
+        "the leg of 50 m between the free space and start of vehicle 'boat' is straight, whatever lies there",
+        "the leg of 20 m between the free space and recovery of vehicle 'boat' is straight, whatever lies there",
     )
 
 
