@@ -174,8 +174,8 @@ def _leg_warnings(fleet: Fleet) -> Iterator[str]:
         for which, leg in legs.items():
             if leg.length > 0.0:
                 yield (
-                    f"the leg of {leg.length:.0f} m between the free space and {which} of vehicle {slave.name!r} is"
-                    " straight, whatever lies there"
+                    f"the leg of {leg.length:.0f} m between the free space and {which} of vehicle {slave.name!r}"
+                    " is straight, whatever lies there"
                 )
 
 
