@@ -10,9 +10,8 @@ import msgspec
 from oxbow.contracts import Per
 from oxbow.errors import InvalidMission
 from oxbow.frame import Position
-from oxbow.strict_json import decode_json, gathered
 
-__all__ = ["GivenDangerZone", "danger_zone_document", "gathered_danger_zones", "require_dangers"]
+__all__ = ["GivenDangerZone", "require_dangers"]
 
 _JSON_NAMES = {"name": "Name", "contour": "Contour", "danger": "Danger", "per": "Per"}
 
@@ -39,19 +38,6 @@ class GivenDangerZone(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NA
     danger: float
     per: Per = Per.CROSSING
     extra: dict[str, Any] = {}
-
-
-def gathered_danger_zones(data: bytes) -> msgspec.Raw:
-    """The JSON of `DangerZones`, the fields of each without a meaning here gathered in its `extra`."""
-    zones = decode_json(data, list[dict[str, msgspec.Raw]], "DangerZones", at="DangerZones")
-    known = frozenset(_JSON_NAMES.values())
-    return msgspec.Raw(msgspec.json.encode([gathered(zone, known) for zone in zones]))
-
-
-def danger_zone_document(zone: GivenDangerZone) -> dict[str, Any]:
-    """A danger zone as the Mission File has it."""
-    fields = {json: getattr(zone, field) for field, json in _JSON_NAMES.items()}
-    return {name: value for name, value in fields.items() if value is not None} | zone.extra
 
 
 def require_dangers(zones: Sequence[GivenDangerZone]) -> None:

@@ -15,14 +15,14 @@ import msgspec
 import numpy as np
 
 from oxbow.contracts import MAX_REQUEST_BYTES, Role, Variogram
-from oxbow.danger_zones import GivenDangerZone, danger_zone_document, gathered_danger_zones, require_dangers
+from oxbow.danger_zones import GivenDangerZone, require_dangers
 from oxbow.errors import InvalidMission
 from oxbow.files import read_bytes, write_atomically
 from oxbow.frame import Position, lonlat
 from oxbow.plan import PlanOptions, PlanRecord
 from oxbow.prior import PriorFeature, PriorModel, parse_prior, prior_document
-from oxbow.strict_json import decode_json, gathered
-from oxbow.vehicles import GivenVehicle, VehiclePath, gathered_vehicles, require_distinct, vehicle_document
+from oxbow.strict_json import decode_json, document_of, gathered, gathered_part
+from oxbow.vehicles import GivenVehicle, VehiclePath, require_distinct
 
 __all__ = [
     "Bloom",
@@ -104,9 +104,12 @@ _POSITIVE = (
     "minimal_spatial_rate_m",
     "swath_m",
 )
-
-
-_BLOOM_NAMES = frozenset({"Sensor", "Value"})
+_PARTS: dict[str, tuple[type[msgspec.Struct], bool]] = {
+    "Bloom": (Bloom, False),
+    "Vehicles": (GivenVehicle, True),
+    "DangerZones": (GivenDangerZone, True),
+}
+"""What else may have fields without a meaning here, and whether it is a list of such objects."""
 
 
 class OutlineName(enum.StrEnum):
@@ -288,13 +291,9 @@ def parse_mission(data: bytes) -> Mission:
     names = [name for name in OutlineName if name in document]
     if len(names) > 1:
         raise InvalidMission("is given beside BoundingBox, its newer name; expected one of them", where="InBox")
-    if "Bloom" in document and bytes(document["Bloom"]).startswith(b"{"):
-        bloom = gathered(decode_json(bytes(document["Bloom"]), dict[str, msgspec.Raw], "Bloom"), _BLOOM_NAMES)
-        document["Bloom"] = msgspec.Raw(msgspec.json.encode(bloom))
-    if "Vehicles" in document and bytes(document["Vehicles"]).startswith(b"["):
-        document["Vehicles"] = gathered_vehicles(bytes(document["Vehicles"]))
-    if "DangerZones" in document and bytes(document["DangerZones"]).startswith(b"["):
-        document["DangerZones"] = gathered_danger_zones(bytes(document["DangerZones"]))
+    for name, (kind, is_list) in _PARTS.items():
+        if name in document:
+            document[name] = gathered_part(bytes(document[name]), kind, name, is_list=is_list)
     if names:
         document["BoundingBox"] = document.pop(names[0])
         document["outline_name"] = msgspec.Raw(msgspec.json.encode(names[0]))
@@ -316,12 +315,11 @@ def mission_json(mission: Mission) -> bytes:
     if mission.prior_model is not None:
         given["PriorModel"] = prior_document(mission.prior_model)
     if mission.bloom is not None:
-        bloom = mission.bloom
-        given["Bloom"] = {"Sensor": bloom.sensor, "Value": bloom.value} | bloom.extra
+        given["Bloom"] = document_of(mission.bloom)
     if mission.vehicles is not None:
-        given["Vehicles"] = [vehicle_document(vehicle) for vehicle in mission.vehicles]
+        given["Vehicles"] = [document_of(vehicle) for vehicle in mission.vehicles]
     if mission.danger_zones is not None:
-        given["DangerZones"] = [danger_zone_document(zone) for zone in mission.danger_zones]
+        given["DangerZones"] = [document_of(zone) for zone in mission.danger_zones]
     document = given | {mission.outline_name.value: outline} | mission.extra | outputs
     present = {name: value for name, value in document.items() if value is not None or name in mission.extra}
     return msgspec.json.format(msgspec.json.encode(present), indent=2) + b"\n"

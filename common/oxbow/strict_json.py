@@ -11,9 +11,11 @@ from msgspec import inspect
 
 from oxbow.errors import InvalidMission
 
-__all__ = ["decode_json", "gathered"]
+__all__ = ["decode_json", "document_of", "gathered", "gathered_part"]
 
 T = TypeVar("T")
+
+EXTRA = "extra"
 
 _MISTYPED = re.compile(r"(?P<problem>.*?)(?: - at `\$\.?(?P<path>.*)`)?", re.DOTALL)
 _MISSING = re.compile(r"Object missing required field `(.*)`")
@@ -58,7 +60,33 @@ def gathered(document: dict[str, msgspec.Raw], known: frozenset[str]) -> dict[st
     """The known fields of a JSON object, less those that are null, and all others together under `extra`."""
     fields = {name: raw for name, raw in document.items() if name in known and bytes(raw) != b"null"}
     extra = {name: raw for name, raw in document.items() if name not in known}
-    return fields | {"extra": msgspec.Raw(msgspec.json.encode(extra))}
+    return fields | {EXTRA: msgspec.Raw(msgspec.json.encode(extra))}
+
+
+def gathered_part(data: bytes, kind: type[msgspec.Struct], name: str, *, is_list: bool = False) -> msgspec.Raw:
+    """The JSON of an object, or of a list of objects, as a struct has it that keeps unknown fields in its `extra`.
+
+    What is neither is left to whoever decodes it.
+    """
+    if not data.startswith(b"[" if is_list else b"{"):
+        return msgspec.Raw(data)
+    known = frozenset(_names(kind).values())
+    if is_list:
+        objects = decode_json(data, list[dict[str, msgspec.Raw]], name, at=name)
+        return msgspec.Raw(msgspec.json.encode([gathered(each, known) for each in objects]))
+    return msgspec.Raw(msgspec.json.encode(gathered(decode_json(data, dict[str, msgspec.Raw], name), known)))
+
+
+def document_of(value: msgspec.Struct) -> dict[str, Any]:
+    """The JSON object of a struct that keeps unknown fields in its `extra`; what is None is left out."""
+    fields = {name: getattr(value, field) for field, name in _names(type(value)).items()}
+    extra: dict[str, Any] = getattr(value, EXTRA)
+    return {name: field for name, field in fields.items() if field is not None} | extra
+
+
+def _names(kind: type[msgspec.Struct]) -> dict[str, str]:
+    """What each field is called in JSON, but for `extra`."""
+    return {field.name: field.encode_name for field in msgspec.structs.fields(kind) if field.name != EXTRA}
 
 
 def _located(problem: str, data: bytes) -> str:

@@ -11,9 +11,8 @@ import msgspec
 from oxbow.contracts import Role
 from oxbow.errors import InvalidMission
 from oxbow.frame import Position
-from oxbow.strict_json import decode_json, gathered
 
-__all__ = ["GivenVehicle", "VehiclePath", "gathered_vehicles", "require_distinct", "vehicle_document"]
+__all__ = ["GivenVehicle", "VehiclePath", "require_distinct"]
 
 _JSON_NAMES = {
     "name": "Name",
@@ -63,19 +62,6 @@ class VehiclePath(
     name: str
     role: Role
     path: tuple[Position, ...]
-
-
-def gathered_vehicles(data: bytes) -> msgspec.Raw:
-    """The JSON of `Vehicles`, the fields of each without a meaning here gathered in its `extra`."""
-    vehicles = decode_json(data, list[dict[str, msgspec.Raw]], "Vehicles", at="Vehicles")
-    known = frozenset(_JSON_NAMES.values())
-    return msgspec.Raw(msgspec.json.encode([gathered(vehicle, known) for vehicle in vehicles]))
-
-
-def vehicle_document(vehicle: GivenVehicle) -> dict[str, Any]:
-    """A vehicle as the Mission File has it."""
-    fields = {json: getattr(vehicle, field) for field, json in _JSON_NAMES.items()}
-    return {name: value for name, value in fields.items() if value is not None} | vehicle.extra
 
 
 def require_distinct(vehicles: Sequence[GivenVehicle]) -> None:
