@@ -98,7 +98,9 @@ def plan(
     draw: Annotated[
         str, typer.Option(help="How SpaceFillingCurve draws its inputs: low-discrepancy or convex-combination.")
     ] = "low-discrepancy",
-    timeout: Annotated[float, typer.Option(metavar="S", min=0.001, help="Give up after so many seconds.")] = 300.0,
+    timeout: Annotated[
+        float, typer.Option(metavar="S", min=0.001, max=1e6, help="Give up after so many seconds.")
+    ] = 300.0,
     home: Home = None,
     json: AsJson = False,
 ) -> None:
@@ -115,14 +117,22 @@ def plan(
     - `oxbow plan lake.json --connect tcp/127.0.0.1:7447`: on a stack that `oxbow up` keeps running
     - `oxbow plan lake.json --prior blooms.geojson --time-limit 10`
     """
-    from oxbow.mission import read_mission
     from oxbow_cli import report
-    from oxbow_cli.arguments import endpoint, plan_options, require_compatible, save, with_prior
+    from oxbow_cli.arguments import (
+        endpoint,
+        plan_options,
+        read,
+        require_compatible,
+        require_place,
+        save,
+        with_prior,
+    )
     from oxbow_cli.home import recordings_folder
     from oxbow_cli.planning import Job, plan_embedded, plan_here, plan_on
 
     require_compatible(local=local, connect=connect, record=record, time_limit_s=time_limit, timeout_s=timeout)
-    mission = with_prior(read_mission(file), prior)
+    require_place(output or file)
+    mission = with_prior(read(file), prior)
     options = plan_options(
         method, seed=seed, heading_deg=heading, time_limit_s=time_limit, smooth=smooth, draw=draw
     )
@@ -197,7 +207,7 @@ def status(
 
 @app.command()
 def evaluate(
-    file: Annotated[Path | None, typer.Argument(metavar="[FILE]", help="The Mission File.")] = None,
+    file: Annotated[Path | None, typer.Argument(metavar="FILE", help="The Mission File.")] = None,
     compare: Annotated[
         tuple[Path, Path] | None, typer.Option(metavar="A B", help="Two Mission Files, side by side.")
     ] = None,
@@ -214,21 +224,25 @@ def evaluate(
     - `oxbow evaluate --compare lake-a.json lake-b.json`
     """
     from oxbow.errors import InvalidMission
-    from oxbow.mission import read_mission
     from oxbow_cli import report
+    from oxbow_cli.arguments import naming, read
     from oxbow_cli.comparison import compare as compare_paths
     from oxbow_cli.evaluation import evaluate
 
     if (file is None) == (compare is None):
         raise InvalidMission("expected one Mission File, or two after --compare", where="FILE")
     if compare is not None:
-        comparison = compare_paths(*map(read_mission, compare))
+        missions = []
+        for path in compare:
+            with naming(str(path)):
+                missions.append(read(path))
+        comparison = compare_paths(*missions, names=(str(compare[0]), str(compare[1])))
         if json:
             report.print_json(report.comparison_document(compare, comparison))
         else:
             report.print_comparison(compare, comparison)
     elif file is not None:
-        found = evaluate(read_mission(file))
+        found = evaluate(read(file))
         if json:
             report.print_json(found)
         else:
@@ -288,12 +302,11 @@ def picture(
     - `oxbow picture lake.json -o lake.png`
     - `oxbow picture lake.json --gaps -o gaps.png`
     """
-    from oxbow.mission import read_mission
-    from oxbow_cli.arguments import writing
+    from oxbow_cli.arguments import read, writing
     from oxbow_cli.gaps import draw_gaps
     from oxbow_cli.picture import draw
 
-    mission = read_mission(file)
+    mission = read(file)
     with writing(output):
         (draw_gaps if gaps else draw)(mission, output)
 

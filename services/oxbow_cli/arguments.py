@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
+import os
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -14,9 +15,9 @@ import msgspec
 
 from oxbow.bus import DEFAULT_ENDPOINT
 from oxbow.contracts import Draw, Method
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidMission, OxbowError
 from oxbow.frame import Position
-from oxbow.mission import Mission, write_mission
+from oxbow.mission import Mission, read_mission, write_mission
 from oxbow.plan import PlanOptions
 from oxbow.prior_file import read_prior
 
@@ -24,10 +25,13 @@ E = TypeVar("E", bound=enum.StrEnum)
 
 __all__ = [
     "endpoint",
+    "naming",
     "plan_options",
     "position",
+    "read",
     "replica_counts",
     "require_compatible",
+    "require_place",
     "save",
     "with_prior",
     "writing",
@@ -57,6 +61,8 @@ def plan_options(
     method: str, *, seed: int, heading_deg: float | None, time_limit_s: float | None, smooth: bool, draw: str
 ) -> PlanOptions:
     """How to plan."""
+    if heading_deg is not None and not math.isfinite(heading_deg):
+        raise InvalidMission(f"is {heading_deg!r}; expected degrees clockwise from north", where="--heading")
     return PlanOptions(
         method=_one_of(Method, method, "--method"),
         seed=seed,
@@ -104,6 +110,35 @@ def require_compatible(
             f"is {str(record)!r}; only a plan with neither --local nor --connect makes its own recording",
             where="--record",
         )
+    if record is not None and record.suffix != ".rrd":
+        raise InvalidMission(f"is {str(record)!r}; expected a name that ends in .rrd", where="--record")
+
+
+def read(path: Path) -> Mission:
+    """The mission in a file; an error about the file as a whole has its name."""
+    try:
+        return read_mission(path)
+    except InvalidMission as error:
+        where = str(path) if error.where == "Mission File" else error.where
+        raise InvalidMission(error.message, where) from error
+
+
+@contextmanager
+def naming(file: str) -> Iterator[None]:
+    """Name the file of which an error tells, where a command takes several."""
+    try:
+        yield
+    except OxbowError as error:
+        raise type(error)(error.message, file if error.where == file else f"{file}: {error.where}") from error
+
+
+def require_place(path: Path) -> None:
+    """Refuse what cannot be written before a plan is made for it."""
+    if path.is_dir():
+        raise InvalidMission("cannot be written: is a folder; expected the name of a file", where=str(path))
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        folder = "cannot be written to" if path.parent.is_dir() else "does not exist"
+        raise InvalidMission(f"cannot be written: the folder {str(path.parent)!r} {folder}", where=str(path))
 
 
 def save(path: Path, mission: Mission) -> None:

@@ -11,6 +11,7 @@ import shapely
 from oxbow.contracts import Message
 from oxbow.mission import Mission
 from oxbow.site import Site
+from oxbow_cli.arguments import naming
 from oxbow_cli.evaluation import Evaluation, evaluate
 
 __all__ = ["Comparison", "compare"]
@@ -66,8 +67,8 @@ class Comparison(Message, frozen=True, kw_only=True):
     differences: tuple[str, ...]
 
 
-def compare(first: Mission, second: Mission) -> Comparison:
-    """Evaluate two missions' paths, and tell which is better at what.
+def compare(first: Mission, second: Mission, *, names: tuple[str, str] = ("first", "second")) -> Comparison:
+    """Evaluate two missions' paths, and tell which is better at what; errors have the name of the mission.
 
     Raises
     ------
@@ -76,14 +77,17 @@ def compare(first: Mission, second: Mission) -> Comparison:
     Infeasible
         The zones or the safety distance leave no water to judge on.
     """
+    with naming(names[0]):
+        one = evaluate(first)
+    with naming(names[1]):
+        other = evaluate(second)
     differences = tuple(_differences(first, second))
-    one, other = evaluate(first), evaluate(second)
-    names = [name for name in (*MORE_IS_BETTER, *LESS_IS_BETTER) if not differences or name in OF_ANY_MISSION]
+    measures = [name for name in (*MORE_IS_BETTER, *LESS_IS_BETTER) if not differences or name in OF_ANY_MISSION]
     return Comparison(
         first=one,
         second=other,
-        first_better=tuple(name for name in names if _is_better(name, one, other)),
-        second_better=tuple(name for name in names if _is_better(name, other, one)),
+        first_better=tuple(name for name in measures if _is_better(name, one, other)),
+        second_better=tuple(name for name in measures if _is_better(name, other, one)),
         first_breaks=tuple(_broken_rules(one)),
         second_breaks=tuple(_broken_rules(other)),
         differences=differences,

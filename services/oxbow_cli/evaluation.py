@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import msgspec
@@ -11,7 +12,7 @@ import numpy as np
 from shapely import LineString
 
 from oxbow.contracts import Certificate, CertifyRequest, Conformance, Measures, Role, Track
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidMission, OxbowError
 from oxbow.fleet import Member
 from oxbow.frame import Frame, Position, geodesic_length_m, lonlat
 from oxbow.mission import Mission
@@ -19,7 +20,9 @@ from oxbow.plan import PlanCertificate
 from oxbow.site import Site
 from oxbow_certificate.certify import certify
 
-__all__ = ["Evaluation", "VehicleEvaluation", "certify_request", "evaluate"]
+__all__ = ["Evaluation", "VehicleEvaluation", "certify_request", "evaluate", "named_as_given"]
+
+_FIELDS = {"safety_m": "Safety", "zones": "ForbiddenZones"}
 
 
 class VehicleEvaluation(Conformance, frozen=True, kw_only=True):
@@ -74,7 +77,8 @@ def evaluate(mission: Mission) -> Evaluation:
     site = Site.of(mission)
     paths = list(_paths(mission, site))
     teams = [[path for path in paths if path.role is role] for role in dict.fromkeys(path.role for path in paths)]
-    certificates = [certify(_request(mission, site, team)) for team in teams]
+    with named_as_given():
+        certificates = [certify(_request(mission, site, team)) for team in teams]
     vehicles = [
         _vehicle(path, conformance)
         for team, certificate in zip(teams, certificates, strict=True)
@@ -94,6 +98,15 @@ def evaluate(mission: Mission) -> Evaluation:
         ends_at_recovery_m=max(vehicle.ends_at_recovery_m for vehicle in first),
         vehicles=tuple(vehicles),
     )
+
+
+@contextmanager
+def named_as_given() -> Iterator[None]:
+    """Name in errors of the certificate's algorithms the fields that the Mission File has."""
+    try:
+        yield
+    except OxbowError as error:
+        raise type(error)(error.message, _FIELDS.get(error.where, error.where)) from error
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from oxbow_certificate.axes import Paths
 from oxbow_certificate.certify import Judgement, judge
 from oxbow_certificate.distance import PathDistance
 from oxbow_cli import sheet
-from oxbow_cli.evaluation import certify_request
+from oxbow_cli.evaluation import certify_request, named_as_given
 from oxbow_cli.sheet import GAP, INK
 
 __all__ = ["GAPS", "MOST_RADII", "Unit", "draw_gaps"]
@@ -96,7 +96,8 @@ def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     sheet.checked_format(path, width_px)
     site = Site.of(mission)
     request = certify_request(mission, site)
-    judgement = judge(request)
+    with named_as_given():
+        judgement = judge(request)
     unit = Unit.of(mission, judgement, treats=bool(request.areas))
     figure, axes = sheet.new_sheet(site)
     sheet.draw_site(axes, site, mission.safety_m)

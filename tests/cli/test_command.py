@@ -47,6 +47,15 @@ def test_an_error_names_the_field_and_the_value_in_one_line(oxbow, folder, pond)
     assert result.stdout == ""
 
 
+@pytest.mark.parametrize("arguments", [["plan", "--local"], ["evaluate"], ["picture", "-o", "a.png"]])
+def test_a_file_that_is_no_json_is_named(oxbow, folder, arguments):
+    (folder / "typo.json").write_text('{"MissionType": map}')
+    command, *options = arguments
+    result = oxbow(command, "typo.json", *options)
+    assert result.returncode == 2
+    assert result.stderr.startswith("error: typo.json: is not JSON")
+
+
 def test_a_traceback_is_shown_only_when_asked_for(oxbow):
     assert "Traceback" not in oxbow("evaluate", "pond.json").stderr
     assert "Traceback" in oxbow("--debug", "evaluate", "pond.json").stderr

@@ -95,6 +95,28 @@ def test_differences_are_printed(oxbow, folder, pond, walked, rows):
 
 
 @pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (lambda pond: pond(), "other.json: Master_Path: has 0 waypoints"),
+        (lambda pond: pond(Safety=-1.0), "other.json: Safety: is -1.0"),
+        (
+            lambda pond: pond(Safety=500.0, Master_Path=[pond()["LaunchPoint"]] * 2 + [pond()["BoundingBox"][1]]),
+            "other.json: Safety: ",
+        ),
+        (lambda _: [], "other.json: is []; expected an object"),
+    ],
+    ids=["no path", "field", "geometry", "no object"],
+)
+def test_of_two_files_the_wrong_one_is_named(oxbow, folder, pond, walked, content, told):
+    (folder / "other.json").write_text(json.dumps(content(pond)))
+    for files in ((walked, "other.json"), ("other.json", walked)):
+        result = oxbow("evaluate", "--compare", *files)
+        assert result.returncode in (2, 3)
+        assert told in result.stderr
+        assert "walked.json" not in result.stderr
+
+
+@pytest.mark.parametrize(
     "arguments", [[], ["pond.json", "--compare", "pond.json", "pond.json"]], ids=["none", "both"]
 )
 def test_one_file_or_two_to_compare(oxbow, arguments):

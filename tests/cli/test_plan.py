@@ -47,7 +47,9 @@ def test_writes_elsewhere_when_asked(oxbow, folder):
         ({}, ["--prior", "prior.json"], 2, ["prior.json"]),
         ({}, ["--connect", "tcp/127.0.0.1:7447"], 2, ["--local", "--connect"]),
         ({}, ["--record", "pond.rrd"], 2, ["--record"]),
-        ({}, ["-o", "missing/planned.json"], 2, ["missing/planned.json"]),
+        ({}, ["-o", "missing/planned.json"], 2, ["missing/planned.json", "does not exist"]),
+        ({}, ["-o", "."], 2, ["is a folder"]),
+        ({}, ["--heading", "nan"], 2, ["--heading", "nan", "degrees"]),
     ],
 )
 def test_on_any_failure_the_file_is_untouched(oxbow, folder, pond, fields, options, status, told):
@@ -62,3 +64,16 @@ def test_on_any_failure_the_file_is_untouched(oxbow, folder, pond, fields, optio
     assert all(word in result.stderr for word in told)
     assert file.read_bytes() == before
     assert [path.name for path in folder.iterdir()] == ["pond.json"]
+
+
+def test_a_recording_is_named_as_the_viewer_needs_it(oxbow, folder):
+    result = oxbow("plan", "pond.json", "--record", "pond.txt")
+    assert result.returncode == 2
+    assert result.stderr == "error: --record: is 'pond.txt'; expected a name that ends in .rrd\n"
+    assert [path.name for path in folder.iterdir()] == ["pond.json"]
+
+
+def test_no_time_without_end(oxbow):
+    result = oxbow("plan", "pond.json", "--local", "--timeout", "inf")
+    assert result.returncode == 2
+    assert "--timeout" in result.stderr
