@@ -218,7 +218,7 @@ def print_status(found: StackStatus) -> None:
     _console().print(processes, missions)
 
 
-_PROCESS_FIGURES = ("up", "served", "failed", "queued", "mean", "p95", "memory")
+_PROCESS_FIGURES = ("up", "served", "failed", "queued", "mean", "p95", "MiB")
 
 
 def _process_cells(process: Process) -> tuple[str, ...]:
@@ -226,14 +226,15 @@ def _process_cells(process: Process) -> tuple[str, ...]:
     if ping is None or stats is None:
         return ()
     counts = map(str, (stats.served, stats.failed, stats.queued))
-    memory = f"{(stats.session_rss_bytes + stats.worker_rss_bytes) / 2**20:.0f} MiB"
-    return (f"{ping.uptime_s:.0f} s", *counts, f"{stats.mean_s:.2f} s", f"{stats.p95_s:.2f} s", memory)
+    seconds = (f"{stats.mean_s:.2f} s", f"{stats.p95_s:.2f} s") if stats.served else ("-", "-")
+    memory = f"{(stats.session_rss_bytes + stats.worker_rss_bytes) / 2**20:.0f}"
+    return (f"{ping.uptime_s:.0f} s", *counts, *seconds, memory)
 
 
 def _grid(title: str, left: tuple[str, ...], right: tuple[str, ...]) -> Table:
     table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE, padding=(0, 1, 0, 0))
-    for name in left:
-        table.add_column(name, overflow="fold", min_width=min(len(name) + 6, 13))
+    for number, name in enumerate(left):
+        table.add_column(name, overflow="fold", no_wrap=number == 0)
     for name in right:
         table.add_column(name, justify="right", no_wrap=True)
     return table

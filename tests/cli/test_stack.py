@@ -147,9 +147,9 @@ def test_a_stack_that_is_up(start, oxbow):
     assert [process["service"] for process in found["processes"]].count("contour") == 2
     assert [(mission["mission_id"], mission["state"]) for mission in found["missions"]] == [(mission_id, "done")]
 
-    table = oxbow("status", "--connect", endpoint)
+    table = oxbow("status", "--connect", endpoint, COLUMNS="80")
     assert table.returncode == 0
-    assert all(word in table.stdout for word in (*SERVICES, mission_id))
+    assert all(word in table.stdout for word in (*SERVICES, mission_id, "MiB"))
 
     second = oxbow("up", "--listen", endpoint, OXBOW_HOME="second")
     assert second.returncode == 4
