@@ -1,7 +1,7 @@
 """Draw the figures of these documents: an example mission as its stages show it, and plans good and bad.
 
-``python docs/make_figures.py`` writes `stages.png`, `quality.png`, `gaps.png`, `plans.png` and `fleet.png` in
-`docs/images`.
+``python docs/make_figures.py`` writes `plan.png`, `stages.png`, `quality.png`, `gaps.png`, `plans.png` and `fleet.png`
+in `docs/images`; `docs/recording.md` says how `recording.png` is made.
 """
 
 from __future__ import annotations
@@ -51,6 +51,7 @@ def main() -> None:
         layers[layer.stage, layer.name] = layer
 
     planned = plan_mission(mission, call=local_call(keep))
+    draw(planned, FOLDER / "images" / "plan.png", width_px=1200)
     draw_stages(layers, FOLDER / "images" / "stages.png")
     draw_quality(layers, planned, FOLDER / "images" / "quality.png")
     draw_gaps(planned, FOLDER / "images" / "gaps.png", width_px=840)
