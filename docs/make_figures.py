@@ -1,7 +1,7 @@
 """Draw the figures of these documents: an example mission as its stages show it, and plans good and bad.
 
-``python docs/make_figures.py`` writes `plan.png`, `stages.png`, `quality.png`, `gaps.png`, `plans.png` and `fleet.png`
-in `docs/images`; `docs/recording.md` says how `recording.png` is made.
+``python docs/make_figures.py`` writes `plan.png`, `stages.png`, `quality.png`, `gaps.png`, `plans.png` and
+`fleet.png` in `docs/images`; `docs/recording.md` says how `recording.png` is made.
 """
 
 from __future__ import annotations
