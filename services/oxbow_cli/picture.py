@@ -20,7 +20,7 @@ from matplotlib.lines import Line2D
 from oxbow.contracts import FloatArray
 from oxbow.frame import lonlat
 from oxbow.mission import Mission, MissionType
-from oxbow.plan import TreatmentRecord
+from oxbow.plan import PlanRecord, TreatmentRecord
 from oxbow.site import Site
 from oxbow_cli import sheet
 from oxbow_cli.sheet import GAP, INK
@@ -65,7 +65,7 @@ def draw(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
         _draw_path(axes, paths[0], site.nominal_spacing_m)
         _draw_progress_key(figure)
     elif paths:
-        _draw_fleet(axes, paths, site.nominal_spacing_m)
+        _draw_fleet(axes, paths, min(site.nominal_spacing_m, mission.treated_swath_m or math.inf))
         _draw_names_key(figure, [planned.name for planned in mission.planned_paths])
     _draw_findings(axes, mission, site)
     sheet.draw_ends(axes, site)
@@ -102,7 +102,7 @@ def _draw_path(axes: Axes, xy: FloatArray, spacing_m: float) -> None:
 
 
 def _draw_fleet(axes: Axes, paths: list[FloatArray], spacing_m: float) -> None:
-    """The path of each vehicle in a colour of its own."""
+    """The path of each vehicle in a colour of its own; legs of the least spacing are kept apart."""
     for xy, colour in zip(paths, cycle(FLEET)):
         axes.plot(*xy.T, color=colour, linewidth=sheet.line_width(axes, spacing_m), zorder=4)
     axes.autoscale(False)
@@ -175,15 +175,20 @@ def _figures(mission: Mission) -> str:
         return "a path without a record of its planning"
     plan = mission.plan
     dropped = f"   dropped {sheet.area_text(sum(part.area_m2 for part in plan.dropped))}" if plan.dropped else ""
-    paths = f"{len(mission.planned_paths)} paths" if len(mission.planned_paths) > 1 else "path"
     treated = "" if plan.treatment is None else f"   {_treated(plan.treatment)}"
     if mission.mission_type is MissionType.TREAT:
-        return f"{paths} {sheet.distance_text(plan.length_m)}{treated}"
+        return f"{_paths_text(plan)}{treated}"
     return (
-        f"{plan.method} {paths} {sheet.distance_text(plan.length_m)}"
-        f"   spacing {sheet.distance_text(plan.spacing_m)}"
+        f"{plan.method} {_paths_text(plan)}   spacing {sheet.distance_text(plan.spacing_m)}"
         f"   q {plan.certificate.q:.2f}   p95 {plan.certificate.p95_ratio:.2f}{treated}{dropped}"
     )
+
+
+def _paths_text(plan: PlanRecord) -> str:
+    """How many paths there are, those of slaves included, and their length."""
+    lengths_m = [plan.length_m] if plan.fleet is None else [vehicle.length_m for vehicle in plan.fleet.vehicles]
+    paths = f"{len(lengths_m)} paths" if len(lengths_m) > 1 else "path"
+    return f"{paths} {sheet.distance_text(sum(lengths_m))}"
 
 
 def _treated(treatment: TreatmentRecord) -> str:

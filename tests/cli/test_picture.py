@@ -8,10 +8,11 @@ import matplotlib.image
 import msgspec
 import pytest
 
+from oxbow.contracts import Conformance, Role
 from oxbow.errors import InvalidMission
 from oxbow.mission import mission_json, parse_mission, read_mission
 from oxbow.pipeline import plan_mission
-from oxbow.plan import PlanOptions
+from oxbow.plan import FleetRecord, PlanOptions, VehicleRecord
 from oxbow.site import Site
 from oxbow_cli import sheet
 from oxbow_cli.gaps import draw_gaps
@@ -48,6 +49,26 @@ def warm_share(file):
     """The share of pixels that say: farther than the least radius."""
     red, _, blue = matplotlib.image.imread(file)[..., :3].transpose(2, 0, 1)
     return (red > blue + 0.2).mean()
+
+
+def test_the_paths_of_slaves_are_counted_with_their_length(planned, tmp_path):
+    """The plan's own length is that of the masters."""
+    rules = {name: getattr(planned.plan.certificate, name) for name in Conformance.__struct_fields__}
+    vehicles = tuple(
+        VehicleRecord(
+            name=role,
+            role=role,
+            length_m=length_m,
+            max_length_m=9e3,
+            duration_s=1.0,
+            certificate=Conformance(**rules),
+        )
+        for role, length_m in ((Role.MASTER, 4_000.0), (Role.SLAVE, 2_500.0))
+    )
+    fleet = FleetRecord(makespan_s=1.0, imbalance=0.0, vehicles=vehicles)
+    both = msgspec.structs.replace(planned, plan=msgspec.structs.replace(planned.plan, fleet=fleet))
+    draw(both, tmp_path / "both.svg")
+    assert "2 paths 6.5 km" in (tmp_path / "both.svg").read_text()
 
 
 def test_gaps_are_warm(planned, tmp_path):

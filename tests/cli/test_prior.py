@@ -87,7 +87,7 @@ def test_a_prior_of_wrong_content_is_invalid_input(oxbow, folder, prior, text, t
 
 
 @pytest.mark.parametrize(
-    ("limit", "told"), [("0", "--time-limit"), ("soon", "--time-limit"), ("120", "less than --timeout, 120 s")]
+    ("limit", "told"), [("0", "--time-limit"), ("soon", "--time-limit"), ("300", "less than --timeout, 300 s")]
 )
 def test_a_time_limit_that_cannot_be_kept_is_invalid_input(oxbow, limit, told):
     result = oxbow("plan", "pond.json", "--local", "--time-limit", limit)
