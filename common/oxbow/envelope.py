@@ -24,6 +24,8 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         The run of that mission: its requests and their layers share it.
     origin
         Latitude and longitude (degrees, WGS84) of the origin of the mission's planar frame.
+    part
+        The vehicle or the role that the request is about, where a mission has several: its layers are told apart.
     """
 
     request_id: str
@@ -31,6 +33,7 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     mission_id: str = ""
     run_id: str = ""
     origin: tuple[float, float] | None = None
+    part: str = ""
 
     def remaining_s(self) -> float:
         """Seconds until the deadline; negative once it has passed."""

@@ -32,7 +32,7 @@ class LocalCall:
         self.handlers = dict(handlers)
         self.show = show
 
-    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /) -> R:
+    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /, *, part: str = "") -> R:  # noqa: ARG002
         reply = self.handlers[endpoint.stage](request, self.show)
         if not isinstance(reply, endpoint.reply):
             expected = endpoint.reply.__name__

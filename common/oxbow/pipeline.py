@@ -44,9 +44,12 @@ R = TypeVar("R", bound=Message)
 
 
 class Call(Protocol):
-    """Ask a stage: over the bus (`oxbow.bus.BusCall`) or in this process (`oxbow.local.LocalCall`)."""
+    """Ask a stage: over the bus (`oxbow.bus.BusCall`) or in this process (`oxbow.local.LocalCall`).
 
-    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /) -> R: ...
+    `part` names the vehicle or the role that is asked about, where a mission has several, for recordings.
+    """
+
+    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /, *, part: str = "") -> R: ...
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,10 @@ class Task:
     site: Site
     space: FreeSpace
     call: Call
+
+    def part(self, member: Member) -> str:
+        """Which part of the mission a vehicle is, where there are several."""
+        return member.vehicle.name if len(self.site.members) > 1 else ""
 
 
 def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: Call) -> Mission:
@@ -175,8 +182,8 @@ def _covered(task: Task, member: Member, approach: Approach, water_m2: float) ->
     """A path over all of a space, with the legs to it."""
     with member.named():
         length_m = approach.length_m(member.vehicle.length_m)
-        decomposition = _decomposed(task, approach.space, water_m2 / length_m)
-        plan = _path(task, approach, decomposition, length_m)
+        decomposition = _decomposed(task, member, approach.space, water_m2 / length_m)
+        plan = _path(task, member, approach, decomposition, length_m)
         return VehiclePlan(
             member=member,
             path=approach.joined(plan.path),
@@ -188,15 +195,17 @@ def _covered(task: Task, member: Member, approach: Approach, water_m2: float) ->
         )
 
 
-def _decomposed(task: Task, space: FreeSpace, spacing_m: float) -> Decomposition:
+def _decomposed(task: Task, member: Member, space: FreeSpace, spacing_m: float) -> Decomposition:
     least_m = task.mission.minimal_spatial_rate_m or 0.0
     request = DecomposeRequest(
         free=space.free, spacing_m=max(spacing_m, least_m), heading_rad=task.options.heading_rad
     )
-    return task.call(DECOMPOSE, request)
+    return task.call(DECOMPOSE, request, part=task.part(member))
 
 
-def _path(task: Task, approach: Approach, decomposition: Decomposition, length_m: float) -> PathPlan:
+def _path(
+    task: Task, member: Member, approach: Approach, decomposition: Decomposition, length_m: float
+) -> PathPlan:
     options = task.options
     return task.call(
         PATH,
@@ -214,6 +223,7 @@ def _path(task: Task, approach: Approach, decomposition: Decomposition, length_m
             smooth=options.smooth,
             draw=options.draw,
         ),
+        part=task.part(member),
     )
 
 
@@ -231,6 +241,7 @@ def _certified(task: Task, vehicles: Sequence[VehiclePlan], areas: tuple[Polygon
             areas=areas,
             danger_zones=task.site.danger_zones,
         ),
+        part=vehicles[0].member.vehicle.role if len(task.mission.mission_type.roles) > 1 else "",
     )
 
 

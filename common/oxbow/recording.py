@@ -85,6 +85,8 @@ class Stamped(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         The run of the mission: another run of one mission is another recording.
     time_s
         Unix time at which the stage showed the layer.
+    part
+        The vehicle or the role that it is about, where a mission has several.
     layer
         What was shown.
     """
@@ -93,6 +95,7 @@ class Stamped(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     origin: tuple[float, float] | None = None
     request_id: str = ""
     time_s: float
+    part: str = ""
     layer: Layer
 
 

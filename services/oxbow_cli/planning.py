@@ -116,10 +116,10 @@ class _Reported:
         self.expected = expected
         self.made = 0
 
-    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /) -> R:
+    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /, *, part: str = "") -> R:
         self.progress(endpoint.stage, min(self.made / self.expected, 1.0))
         self.made += 1
-        return self.call(endpoint, request)
+        return self.call(endpoint, request, part=part)
 
 
 @contextmanager

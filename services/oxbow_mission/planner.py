@@ -125,7 +125,7 @@ class _Run:
         self._show_outcome("done", f"planned in {sum(self.seconds.values()):.2f} s")
         return mission_json(_stamped(mission, self.job.revision))
 
-    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /) -> R:
+    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /, *, part: str = "") -> R:
         """Call a stage, and tell that it is at work."""
         if self.registry.closed:
             raise Unavailable("the service stops; the mission goes on another time", where=STAGE)
@@ -134,7 +134,7 @@ class _Run:
         self.calls += 1
         started = time.monotonic()
         try:
-            return self._call(endpoint, request)
+            return self._call(endpoint, request, part=part)
         finally:
             name = f"{endpoint.stage}_s"
             self.seconds[name] = self.seconds.get(name, 0.0) + time.monotonic() - started

@@ -29,7 +29,7 @@ def _path() -> rrb.Horizontal:
     return _beside(
         "Path",
         _plane(
-            "Paths, and the tree that the last began with",
+            "Paths, and the trees that they began with",
             "contour/eroded",
             "assignment/shares",
             "assignment/hot_spots",
@@ -118,7 +118,7 @@ def _plane(name: str, *entities: str) -> rrb.Spatial2DView:
 
 def _plot(name: str, *figures: str) -> rrb.TimeSeriesView:
     """Figures of one unit, step by step."""
-    return rrb.TimeSeriesView(origin="/", name=name, contents=list(figures))
+    return rrb.TimeSeriesView(origin="/", name=name, contents=[f"{figure}/**" for figure in figures])
 
 
 def _beside(name: str, main: rrb.View, second: rrb.View, *small: rrb.View) -> rrb.Horizontal:

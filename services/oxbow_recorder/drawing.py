@@ -85,17 +85,21 @@ class Drawn:
     archetype: rr.AsComponents
 
 
-def draw(layer: Layer, frame: Frame | None) -> Iterator[Drawn]:
-    """Everything that one layer logs; the map's share only where the frame is known."""
-    entity = f"{layer.stage}/{layer.name}"
+def draw(layer: Layer, frame: Frame | None, part: str = "") -> Iterator[Drawn]:
+    """Everything that one layer logs; the map's share only where the frame is known.
+
+    Layers of several vehicles or roles, the parts of a mission, lie beside one another.
+    """
+    within = f"/{rr.escape_entity_path_part(part)}" if part else ""
+    entity = f"{layer.stage}/{layer.name}{within}"
     if layer.kind is LayerKind.GRAPH:
         yield from _graph(layer, entity)
     if layer.kind is LayerKind.GEOMETRY:
         yield from _flat(layer, entity)
         if frame is not None and (layer.stage, layer.name) in ON_MAP:
-            yield from _on_map(layer, frame)
+            yield from _on_map(layer, frame, entity)
     for name, value in layer.scalars.items():
-        yield Drawn(f"{entity}/{name}", rr.Scalars(value))
+        yield Drawn(f"{layer.stage}/{layer.name}/{name}{within}", rr.Scalars(value))
     if layer.text:
         level = rr.TextLogLevel.ERROR if layer.name == "failed" else rr.TextLogLevel.INFO
         yield Drawn(f"log/{layer.stage}", rr.TextLog(layer.text, level=level))
@@ -130,18 +134,18 @@ def _flat(layer: Layer, entity: str) -> Iterator[Drawn]:
         )
 
 
-def _on_map(layer: Layer, frame: Frame) -> Iterator[Drawn]:
+def _on_map(layer: Layer, frame: Frame, entity: str) -> Iterator[Drawn]:
     strips, owners = _strips(layer.geometries)
     colours = _colours(layer)
     if strips:
         lines = [frame.to_degrees(strip)[:, ::-1] for strip in strips]
         archetype = rr.GeoLineStrings(lat_lon=lines, colors=colours[owners], radii=rr.Radius.ui_points(1.5))
-        yield Drawn(f"map/{layer.stage}/{layer.name}/lines", archetype)
+        yield Drawn(f"map/{entity}/lines", archetype)
     points, number = _points(layer.geometries)
     if len(points):
         places = frame.to_degrees(points)[:, ::-1]
         dots = rr.GeoPoints(lat_lon=places, colors=colours[number], radii=rr.Radius.ui_points(5.0))
-        yield Drawn(f"map/{layer.stage}/{layer.name}/points", dots)
+        yield Drawn(f"map/{entity}/points", dots)
 
 
 def _graph(layer: Layer, entity: str) -> Iterator[Drawn]:

@@ -54,7 +54,7 @@ class Recording:
         frame = None if stamped.origin is None else Frame(*stamped.origin)
         self._stream.set_time("time", timestamp=stamped.time_s)
         self._stream.set_time("step", sequence=layer.step)
-        for drawn in draw(layer, frame):
+        for drawn in draw(layer, frame, stamped.part):
             self._stream.log(drawn.entity, drawn.archetype)
 
     def close(self) -> Path:

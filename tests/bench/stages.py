@@ -40,12 +40,13 @@ class TimedCall:
     call: Call
     seconds: dict[str, float] = field(default_factory=dict)
 
-    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /) -> R:
+    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /, *, part: str = "") -> R:
         started = time.perf_counter()
         try:
-            return self.call(endpoint, request)
+            return self.call(endpoint, request, part=part)
         finally:
-            self.seconds[endpoint.stage] = time.perf_counter() - started
+            before_s = self.seconds.get(endpoint.stage, 0.0)
+            self.seconds[endpoint.stage] = before_s + time.perf_counter() - started
 
 
 def measure() -> Iterator[Section]:

@@ -4,6 +4,7 @@ import json
 from itertools import pairwise
 
 import msgspec
+import numpy as np
 import pytest
 import shapely
 from shapely import LineString
@@ -67,12 +68,14 @@ class Calls:
 
     def __init__(self):
         self.stages = []
+        self.parts = []
         self.shares = {}
         self._call = local_call()
 
-    def __call__(self, endpoint, request, /):
+    def __call__(self, endpoint, request, /, *, part=""):
         reply = self._call(endpoint, request)
         self.stages.append(endpoint.stage)
+        self.parts.append(part)
         if endpoint is ASSIGN:
             self.shares |= {share.vehicle: share.area for share in reply.shares}
         return reply
@@ -103,6 +106,7 @@ def lines(completed):
 def test_one_master_surveys(kind):
     completed, calls = planned(mission(kind))
     assert calls.stages == ["contour", "decomposition", "path", "certificate"]
+    assert set(calls.parts) == {""}
     assert completed.master_path
     assert completed.slave_path is completed.paths is None
     assert completed.plan.fleet is completed.plan.treatment is None
@@ -123,6 +127,8 @@ def test_masters_share_the_water_and_keep_to_their_shares(count):
     plan, paths = completed.plan, lines(completed)
     assert completed.master_path is None
     assert list(paths) == [vehicle.name for vehicle in plan.fleet.vehicles] == list(calls.shares)
+    asked = zip(calls.stages, calls.parts, strict=True)
+    assert [part for stage, part in asked if stage in ("decomposition", "path")] == list(np.repeat(list(paths), 2))
     assert plan.fleet.imbalance <= 0.05
     assert plan.fleet.makespan_s == max(vehicle.duration_s for vehicle in plan.fleet.vehicles)
     assert plan.certificate.q <= 3.2
@@ -174,7 +180,9 @@ def test_nothing_that_can_be_treated_is_infeasible():
 
 @pytest.mark.parametrize("kind", ["map&treat", "adap&treat"])
 def test_master_surveys_and_slave_treats(kind):
-    completed, _ = planned(mission(kind))
+    completed, calls = planned(mission(kind))
+    asked = zip(calls.stages, calls.parts, strict=True)
+    assert [part for stage, part in asked if stage == "certificate"] == [Role.MASTER, Role.SLAVE]
     assert completed.master_path
     assert completed.slave_path
     plan = completed.plan

@@ -105,6 +105,19 @@ def test_each_vehicle_has_one_colour_in_shares_and_paths():
     assert len(set(colours[0])) == 2
 
 
+def test_parts_of_a_mission_lie_beside_one_another():
+    line = Layer(stage="path", name="path", geometries=(shapely.LineString([(0, 0), (1, 1)]),))
+    loop = Layer(stage="path", name="loop", kind=LayerKind.SCALARS, scalars={"length_m": 2.0})
+    graph = Layer(
+        stage="decomposition", name="reeb", kind=LayerKind.GRAPH, nodes=("open", "close"), edges=((0, 1),)
+    )
+    entities = [
+        {each.entity for layer in (line, loop, graph) for each in draw(layer, None, part)} for part in ("", "a b")
+    ]
+    assert entities[0] == {"path/path/lines", "path/loop/length_m", "decomposition/reeb"}
+    assert entities[1] == {r"path/path/a\ b/lines", r"path/loop/length_m/a\ b", r"decomposition/reeb/a\ b"}
+
+
 def test_a_graph_has_its_nodes_where_its_edges_are():
     """Edges under another entity than the nodes' would join nodes of their own."""
     places = (shapely.Point(0, 0), shapely.Point(3_000, 0), shapely.Point(0, -4_000))

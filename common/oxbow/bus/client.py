@@ -114,13 +114,14 @@ class BusCall:
         self.deadline_s = deadline_s
         self.run_id = uuid.uuid4().hex
 
-    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /) -> R:
+    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /, *, part: str = "") -> R:
         envelope = Envelope(
             request_id=uuid.uuid4().hex,
             deadline_s=self.deadline_s,
             mission_id=self.mission_id,
             run_id=self.run_id,
             origin=self.origin,
+            part=part,
         )
         return self.bus.call(endpoint, request, envelope)
 

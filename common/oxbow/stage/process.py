@@ -118,6 +118,7 @@ def _stamped(layer: Layer, envelope: Envelope) -> Stamped:
         origin=envelope.origin,
         request_id=envelope.run_id or envelope.request_id,
         time_s=time.time(),
+        part=envelope.part,
         layer=layer,
     )
 
