@@ -9,15 +9,13 @@ Arguments that are called `corners` are coordinates, shape (m, 3, 2).
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Geometries, Indices
 from oxbow.contracts import FloatArray
 
 __all__ = [
-    "Geometries",
-    "Indices",
     "angles_rad",
     "apexes",
     "cross",
@@ -31,8 +29,6 @@ __all__ = [
     "twins_of",
 ]
 
-Indices = npt.NDArray[np.intp]
-Geometries = npt.NDArray[np.object_]
 
 ROUNDING = 2.0**-48
 """A triangle lower than this share of the greatest coordinate is flat, but for rounding."""

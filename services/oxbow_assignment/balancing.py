@@ -14,18 +14,16 @@ from dataclasses import dataclass
 
 import networkx as nx
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.sparse.linalg import spsolve
 
+from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray
 from oxbow.mesh import Mesh
-from oxbow.triangles import Indices
 
 __all__ = ["balanced_shares", "border_lengths_m", "imbalance"]
 
-Mask = npt.NDArray[np.bool_]
 
 TOLERANCE = 0.01
 """Shares nearer than this to what is due are left as they are."""

@@ -10,10 +10,10 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 from shapely import Polygon
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray, Place
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.mesh import Mesh, propagate
-from oxbow.triangles import Indices
 from oxbow_assignment.balancing import balanced_shares, border_lengths_m, imbalance
 
 __all__ = ["BALANCE", "Partition", "balanced_partition", "wavefront_partition"]

@@ -152,6 +152,24 @@ def test_routes_lead_everywhere_and_never_touch_the_shore(water):
         assert way.distance(water.boundary) > 0 or water.bounds[3] < 1
 
 
+@quick
+@given(seed=st.integers(0, 50), size=st.floats(0.1, 0.5), where=st.integers(0, 10_000))
+def test_the_route_into_an_area_leads_to_the_nearest_place_of_it(seed, size, where):
+    water = lake(seed, roughness=0.5)
+    rng = np.random.default_rng(where)
+    x0, y0, x1, y1 = water.bounds
+    places = rng.uniform((x0, y0), (x1, y1), size=(200, 2))
+    start, middle = places[shapely.contains_xy(water, places)][:2]
+    area = Point(middle).buffer(size * (x1 - x0))
+    routes = Routes(water, 40.0)
+    gates = routes.goals_in(area)
+    ways = [routes.to_area(start, area, gate) for gate in np.array_split(gates, 1 + len(gates) // 9)]
+    nearest = routes.to_area(start, area, gates)
+    assert nearest.length <= min(way.length for way in ways if way is not None)
+    shortest = LineString(routes.between(start, shapely.get_coordinates(nearest)[-1]))
+    assert nearest.length == pytest.approx(shortest.length)
+
+
 def test_a_taut_route_is_no_longer_and_stays_inside():
     routes = Routes(COMB, 20.0)
     way = LineString(routes.between(np.array([25.0, 700.0]), np.array([925.0, 700.0])))

@@ -11,9 +11,10 @@ import shapely
 from scipy.sparse import csr_array
 from shapely import Polygon
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow.mesh.triangulation import Triangulation
-from oxbow.triangles import Indices, angles_rad, doubled_areas, side_lengths
+from oxbow.triangles import angles_rad, doubled_areas, side_lengths
 
 __all__ = ["AngleStatistics", "Mesh"]
 

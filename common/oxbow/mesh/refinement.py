@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from oxbow.arrays import Indices
 from oxbow.mesh.triangulation import Triangulation
-from oxbow.triangles import Indices
 
 __all__ = ["refined"]
 

@@ -10,18 +10,9 @@ import numpy.typing as npt
 import shapely
 from shapely import Polygon
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
-from oxbow.triangles import (
-    Indices,
-    apexes,
-    cross,
-    doubled_areas,
-    flipped,
-    following,
-    side_lengths,
-    triangulated,
-    twins_of,
-)
+from oxbow.triangles import apexes, cross, doubled_areas, flipped, following, side_lengths, triangulated, twins_of
 
 __all__ = ["Triangulation"]
 

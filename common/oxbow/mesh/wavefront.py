@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from oxbow.arrays import Indices
 from oxbow.mesh.mesh import Mesh
-from oxbow.triangles import Indices
 
 __all__ = ["Wavefront", "propagate"]
 

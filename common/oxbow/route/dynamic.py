@@ -16,6 +16,7 @@ import numpy.typing as npt
 import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 
+from oxbow.arrays import Geometries
 from oxbow.contracts import FloatArray
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.route.danger import NO_DANGER, Danger
@@ -23,7 +24,6 @@ from oxbow.route.mesh import ROUNDING_M, Mesh
 from oxbow.route.methods import router_on
 from oxbow.route.retriangulation import GRID_M, retriangulated
 from oxbow.route.route import Route, RouteMethod, Router
-from oxbow.triangles import Geometries
 
 __all__ = ["DynamicRouter"]
 

@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray
 from oxbow.route.channel import Channel
-from oxbow.route.sights import Mask
-from oxbow.triangles import Indices, cross, side_lengths
+from oxbow.triangles import cross, side_lengths
 
 __all__ = ["incenter_line", "incenters"]
 

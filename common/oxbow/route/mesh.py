@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,9 +15,10 @@ from scipy.sparse.csgraph import connected_components
 from shapely import LineString, MultiPolygon, Point, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Geometries, Indices
 from oxbow.contracts import FloatArray
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.triangles import Geometries, Indices, angles_rad, following, triangulated, twins_of
+from oxbow.triangles import angles_rad, following, triangulated, twins_of
 
 __all__ = ["ROUNDING_M", "Mesh", "Touches"]
 
@@ -81,8 +83,12 @@ class Mesh:
     twins: Indices
 
     @classmethod
-    def of(cls, water: Polygon | MultiPolygon, outlines: Sequence[BaseGeometry] = ()) -> Mesh:
+    def of(
+        cls, water: Polygon | MultiPolygon, outlines: Sequence[BaseGeometry] = (), *, detail_m: float = math.inf
+    ) -> Mesh:
         """Triangulate water; no triangle straddles the shore or one of the outlines.
+
+        Shores and outlines are divided into sides no longer than `detail_m`.
 
         Raises
         ------
@@ -91,7 +97,8 @@ class Mesh:
         """
         if water.is_empty or not water.is_valid:
             raise InvalidMission("is empty or not a valid polygon", where="water")
-        points, triangles = triangulated(_parted(water, outlines) if outlines else water)
+        faces = _parted(water, outlines) if outlines else water
+        points, triangles = triangulated(faces if math.isinf(detail_m) else shapely.segmentize(faces, detail_m))
         return cls(points, triangles, twins_of(triangles))
 
     @cached_property
@@ -144,6 +151,13 @@ class Mesh:
         return np.asarray(connected_components(same, directed=False)[1], dtype=np.intp)
 
     @cached_property
+    def sector_places(self) -> FloatArray:
+        """Where each sector is, shape (k, 2)."""
+        places = np.empty((self.sectors.max() + 1, 2))
+        places[self.sectors] = self.tails
+        return places
+
+    @cached_property
     def angles(self) -> FloatArray:
         """The water's angle at each sector, in radians."""
         return np.asarray(np.bincount(self.sectors, angles_rad(self.corners).ravel()), dtype=np.float64)
@@ -159,6 +173,10 @@ class Mesh:
         clear = np.ones(len(lines), dtype=np.bool_)
         clear[self._shore_index.query(lines, predicate="intersects")[0]] = False
         return clear
+
+    def located(self, places: FloatArray) -> Indices:
+        """A triangle that holds each place, shape (n,), or else the nearest one."""
+        return np.asarray(self._index.query_nearest(shapely.points(places), all_matches=False)[1])
 
     def holding(self, places: FloatArray) -> Touches:
         """The triangles that touch each of some places, shape (n, 2); none for a place outside."""

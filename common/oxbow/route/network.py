@@ -13,13 +13,13 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.route.danger import Danger
 from oxbow.route.mesh import Mesh, Touches
 from oxbow.route.route import Route, RouteMethod, judged
 from oxbow.route.search import Arcs, Ways, cheapest_ways, distinct
-from oxbow.triangles import Indices
 
 __all__ = ["Drawn", "Ends", "Links", "Network", "NetworkRouter", "Way"]
 
@@ -148,7 +148,7 @@ class NetworkRouter:
             (departure + links.one, arrival + links.other),
         ):
             arcs += Arcs.one_way(places, *distinct(tails, heads), network.danger)
-        return _Found(ends, arrival, cheapest_ways(len(places), arcs, departure + np.arange(starts)))
+        return _Found(ends, arrival, cheapest_ways(arcs.graph(len(places)), departure + np.arange(starts)))
 
     def _line(self, found: _Found, start: int, goal: int) -> FloatArray:
         way = found.way(start, goal)

@@ -18,9 +18,10 @@ import shapely
 from shapely import STRtree
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Geometries, Indices
 from oxbow.contracts import FloatArray
 from oxbow.route.mesh import ROUNDING_M, Mesh
-from oxbow.triangles import Geometries, Indices, following, paired, triangulated, twins_of
+from oxbow.triangles import following, paired, triangulated, twins_of
 
 __all__ = ["GRID_M", "Site", "retriangulated"]
 

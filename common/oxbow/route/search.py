@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow.route.danger import Danger
-from oxbow.triangles import Indices
 
 __all__ = ["Arcs", "Ways", "cheapest_ways", "distinct"]
 
@@ -35,6 +35,10 @@ class Arcs:
         low, high = distinct(pairs.min(axis=1), pairs.max(axis=1))
         low, high = low[low < high], high[low < high]
         return cls.one_way(places, np.concatenate([low, high]), np.concatenate([high, low]), danger)
+
+    def graph(self, count: int) -> csr_array[np.float64]:
+        """The graph over `count` places."""
+        return coo_array((self.costs, (self.tails, self.heads)), shape=(count, count)).tocsr()
 
     def __add__(self, other: Arcs) -> Arcs:
         return Arcs(
@@ -61,9 +65,8 @@ class Ways:
             place = int(self.previous[source, place])
 
 
-def cheapest_ways(count: int, arcs: Arcs, sources: Indices) -> Ways:
-    """Search a network of `count` places from some of them."""
-    graph = coo_array((arcs.costs, (arcs.tails, arcs.heads)), shape=(count, count)).tocsr()
+def cheapest_ways(graph: csr_array[np.float64], sources: Indices) -> Ways:
+    """Search a graph (`Arcs.graph`) from some of its places."""
     costs, previous = dijkstra(graph, indices=sources, return_predecessors=True)
     return Ways(costs, previous.astype(np.intp))
 

@@ -10,15 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray
 from oxbow.route.mesh import Mesh, Touches
-from oxbow.triangles import Indices, cross, following
+from oxbow.triangles import cross, following
 
-__all__ = ["IN_LINE", "Mask", "Sights", "sights"]
+__all__ = ["IN_LINE", "Sights", "sights"]
 
-Mask = npt.NDArray[np.bool_]
 
 IN_LINE = 1e-12
 """Sine of the angle below which two directions are one: three thousand times what rounding makes of it."""

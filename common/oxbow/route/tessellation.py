@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import KDTree
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow.errors import InvalidMission
 from oxbow.route.danger import NO_DANGER, Danger
@@ -26,7 +27,7 @@ from oxbow.route.mesh import ROUNDING_M, Mesh, Touches
 from oxbow.route.network import Ends, Links, Way
 from oxbow.route.search import Arcs, cheapest_ways
 from oxbow.route.sights import sights
-from oxbow.triangles import Indices, following
+from oxbow.triangles import following
 
 __all__ = ["RINGS", "Tessellation", "lattice"]
 
@@ -114,12 +115,12 @@ class Tessellation:
     @cached_property
     def places(self) -> FloatArray:
         """See `Network.places`: the vertices, once for each sector, then the lattice."""
-        return np.vstack([self._vertices, self._lattice.places])
+        return np.vstack([self.mesh.sector_places, self._lattice.places])
 
     @cached_property
     def arcs(self) -> Arcs:
         """See `Network.arcs`: along the sides of triangles, from vertices to the lattice, and within that."""
-        vertices, sectors = self._vertices, self.mesh.sectors
+        vertices, sectors = self.mesh.sector_places, self.mesh.sectors
         along_sides = np.column_stack([sectors, sectors[following(np.arange(len(sectors)))]])
         vertex, near = self._near(vertices)
         # Where shores touch, a line that ends there does not tell from which side.
@@ -143,14 +144,9 @@ class Tessellation:
         nothing = np.zeros(len(self.mesh.tails), dtype=np.bool_)
         seen = sights(self.mesh, places, touches, places, touches, nothing)
         pairs = np.column_stack([seen.place_eyes, seen.places])
-        ways = cheapest_ways(len(places), Arcs.both_ways(places, pairs, self.danger), np.array([0]))
+        arcs = Arcs.both_ways(places, pairs, self.danger)
+        ways = cheapest_ways(arcs.graph(len(places)), np.array([0]))
         return np.asarray(places[ways.way(0, last)])
-
-    @cached_property
-    def _vertices(self) -> FloatArray:
-        vertices = np.empty((self.mesh.sectors.max() + 1, 2))
-        vertices[self.mesh.sectors] = self.mesh.tails
-        return vertices
 
     @cached_property
     def _lattice(self) -> _Lattice:
@@ -173,7 +169,7 @@ class Tessellation:
     def _touches(self) -> Touches:
         """The triangles that the network's places touch."""
         sectors, touches = self.mesh.sectors, self._lattice.touches
-        on_lattice = Touches(len(self._vertices) + touches.place, touches.triangle)
+        on_lattice = Touches(len(self.mesh.sector_places) + touches.place, touches.triangle)
         return Touches(sectors, np.arange(len(sectors)) // 3) + on_lattice
 
     def _near(self, points: FloatArray) -> tuple[Indices, Indices]:
@@ -182,7 +178,7 @@ class Tessellation:
         owner, place = near["i"], near["j"]
         from_lattice = self._lattice.places[place]
         clear = self.mesh.is_clear(from_lattice, points[owner] + SHORT * (from_lattice - points[owner]))
-        return owner[clear], len(self._vertices) + place[clear]
+        return owner[clear], len(self.mesh.sector_places) + place[clear]
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,14 @@ from functools import cached_property
 
 import numpy as np
 
+from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray
 from oxbow.route.danger import NO_DANGER, Danger
 from oxbow.route.mesh import Mesh, Touches
 from oxbow.route.network import Ends, Links
 from oxbow.route.search import Arcs
-from oxbow.route.sights import IN_LINE, Mask, sights
-from oxbow.triangles import Indices, cross, following
+from oxbow.route.sights import IN_LINE, sights
+from oxbow.triangles import cross, following
 
 __all__ = ["VisibilityGraph"]
 

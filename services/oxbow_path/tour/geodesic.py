@@ -4,6 +4,9 @@ A shortest way in a polygon is straight but for corners of the shore (Lee and Pr
 and corners joins those that see each other nearby, and the corners of every triangle of a constrained Delaunay
 triangulation, so that it is connected wherever the water is, however narrow. Its ways are inside the water; one
 that passes far from any corner that it could turn at may be a little longer than the shortest.
+
+A `Router` finds the costs of all pairs of places. A tour of thousands of sites needs those of near ones alone, and
+the least tree over all, which one search over this graph finds.
 """
 
 from __future__ import annotations
@@ -12,18 +15,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from scipy.sparse import coo_array, csr_array, vstack
-from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
+from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 from shapely import Polygon
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
+from oxbow.route.mesh import Mesh, Touches
+from oxbow.triangles import following
 
-__all__ = ["Geodesics", "Indices", "Shore"]
-
-Indices = npt.NDArray[np.intp]
+__all__ = ["Geodesics", "Shore"]
 
 SITES_IN_SIGHT = 12
 """How many of the nearest sites a site looks for."""
@@ -50,26 +53,21 @@ class Shore:
     def __init__(self, free: Polygon) -> None:
         shapely.prepare(free)
         self.free = free
-        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(free))
-        vertices = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)
-        places, vertex = np.unique(vertices, axis=0, return_inverse=True)
-        self._triangles = shapely.STRtree(triangles)
-        self._sides = _fans(vertex.reshape(-1, 3))
-        _, first = np.unique(self._sides, return_index=True)
-        self._corners = vertices[first]
-        touches = np.bincount(vertex[first], minlength=len(places)) > 1
-        self._touches = shapely.multipoints(places[touches])
-        self._plain = np.flatnonzero(~touches[vertex[first]])
+        self._mesh = Mesh.of(free)
+        self._corners, sectors = self._mesh.sector_places, self._mesh.sectors
+        places, place, count = np.unique(self._corners, axis=0, return_inverse=True, return_counts=True)
+        self._touches = shapely.multipoints(places[count > 1])
+        self._plain = np.flatnonzero(count[place] == 1)
         plain = self._corners[self._plain]
         near = self._plain[_nearest(plain, plain, CORNERS_IN_SIGHT)]
-        around = [self._sides[:, [k, k - 1]] for k in range(3)]
-        self._pairs = np.vstack([self._in_sight(self._corners, near), *around])
+        around = np.column_stack([sectors, sectors[following(np.arange(len(sectors)))]])
+        self._pairs = np.vstack([self._in_sight(self._corners, near), around])
 
     def geodesics(self, sites: FloatArray) -> Geodesics:
         """The ways between some sites, shape (n, 2), of the water."""
         n, places = len(sites), np.vstack([sites, self._corners])
-        _, triangle = self._triangles.query_nearest(shapely.points(sites), all_matches=False)
-        around = np.column_stack([np.repeat(np.arange(n), 3), n + self._sides[triangle].ravel()])
+        site, side = Touches(np.arange(n), self._mesh.located(sites)).sides()
+        around = np.column_stack([site, n + self._mesh.sectors[side]])
         site, corner = _nearest(sites, self._corners[self._plain], CORNERS_IN_SIGHT).T
         looks = [_nearest(sites, sites, SITES_IN_SIGHT), np.column_stack([site, n + self._plain[corner]])]
         pairs = np.vstack([self._in_sight(places, np.vstack(looks)), around, n + self._pairs])
@@ -159,22 +157,3 @@ def _graph(places: FloatArray, pairs: Indices) -> csr_array[np.float64]:
     both = (np.concatenate([a, b]), np.concatenate([b, a]))
     n = len(places)
     return csr_array(coo_array((np.concatenate([weight, weight]), both), shape=(n, n)))
-
-
-def _fans(triangles: Indices) -> Indices:
-    """Number the corners of triangles, shape (n, 3), that are given by their vertices.
-
-    Two triangles have a corner in common where a side that they have in common ends in it.
-    """
-    copies = np.arange(triangles.size).reshape(-1, 3)
-    ends, at = (
-        np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2) for corners in (triangles, copies)
-    )
-    upward = np.argsort(ends, axis=1)
-    ends, at = np.take_along_axis(ends, upward, axis=1), np.take_along_axis(at, upward, axis=1)
-    order = np.lexsort(ends.T)
-    common = np.flatnonzero((ends[order[1:]] == ends[order[:-1]]).all(axis=1))
-    a, b = at[order[common]].ravel(), at[order[common + 1]].ravel()
-    links = coo_array((np.ones(len(a)), (a, b)), shape=(triangles.size, triangles.size))
-    _, corner = connected_components(links, directed=False)
-    return np.asarray(corner, dtype=np.intp).reshape(-1, 3)

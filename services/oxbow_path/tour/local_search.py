@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from oxbow_path.tour.geodesic import Indices
+from oxbow.arrays import Indices
 from oxbow_path.tour.solver import Solution
 from oxbow_path.tour.start import Start
 

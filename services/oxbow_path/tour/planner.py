@@ -11,10 +11,11 @@ import numpy as np
 import shapely
 from shapely import LineString, Polygon
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow.errors import Infeasible
 from oxbow_path.task import Task
-from oxbow_path.tour.geodesic import Geodesics, Indices, Shore
+from oxbow_path.tour.geodesic import Geodesics, Shore
 from oxbow_path.tour.local_search import shortened
 from oxbow_path.tour.outline import enclosed
 from oxbow_path.tour.pruning import pruned

@@ -10,8 +10,9 @@ import heapq
 
 import numpy as np
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
-from oxbow_path.tour.geodesic import Geodesics, Indices
+from oxbow_path.tour.geodesic import Geodesics
 
 __all__ = ["pruned"]
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from oxbow_path.tour.geodesic import Indices
+from oxbow.arrays import Indices
 from oxbow_path.tour.local_search import shortened
 from oxbow_path.tour.solver import Solution
 from oxbow_path.tour.start import Start

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from oxbow_path.tour.geodesic import Indices
+from oxbow.arrays import Indices
 from oxbow_path.tour.start import Start
 
 __all__ = ["Solution", "Solver"]

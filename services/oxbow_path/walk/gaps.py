@@ -10,10 +10,11 @@ from scipy.spatial import cKDTree
 from shapely import LineString, Point, Polygon
 from shapely.ops import substring
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow_path.walk.probe import Probe
 from oxbow_path.walk.region import Brush, Walk, largest, simply_connected
-from oxbow_path.walk.routes import Indices, Routes
+from oxbow_path.walk.routes import Routes
 
 __all__ = ["branch_to", "reach_gaps"]
 

@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from scipy.spatial import cKDTree
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 
 __all__ = ["Probe", "covered"]
-
-Indices = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True)

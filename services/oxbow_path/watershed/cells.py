@@ -11,18 +11,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from shapely import LineString
 
+from oxbow.arrays import Indices, Mask
 from oxbow.errors import InvalidMission
 from oxbow.mesh import Mesh, Wavefront, propagate
-from oxbow.triangles import Indices
 
 __all__ = ["CellPath", "coverage_depth", "shortest_path", "watershed_path"]
-
-Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
