@@ -18,6 +18,7 @@ from oxbow.fleet import Member, members
 from oxbow.frame import Frame, Position, lonlat
 from oxbow.hot_spots import HotSpots, hot_spots
 from oxbow.mission import Mission, MissionType
+from oxbow.unknown_fields import misspelt
 from oxbow.weights import weighted_areas
 
 __all__ = ["Site"]
@@ -128,7 +129,8 @@ class Site:
             warnings=tuple(text for zone in (*forbidden, *dangers) for text in zone.warnings)
             + _prior_warnings(mission, areas)
             + spots.warnings
-            + _idle_warnings(mission),
+            + _idle_warnings(mission)
+            + misspelt(mission),
         )
 
 

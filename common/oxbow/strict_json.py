@@ -11,7 +11,7 @@ from msgspec import inspect
 
 from oxbow.errors import InvalidMission
 
-__all__ = ["decode_json", "document_of", "gathered", "gathered_part"]
+__all__ = ["decode_json", "document_of", "gathered", "gathered_part", "json_names"]
 
 T = TypeVar("T")
 
@@ -70,7 +70,7 @@ def gathered_part(data: bytes, kind: type[msgspec.Struct], name: str, *, is_list
     """
     if not data.startswith(b"[" if is_list else b"{"):
         return msgspec.Raw(data)
-    known = frozenset(_names(kind).values())
+    known = frozenset(json_names(kind).values())
     if is_list:
         objects = decode_json(data, list[dict[str, msgspec.Raw]], name, at=name)
         return msgspec.Raw(msgspec.json.encode([gathered(each, known) for each in objects]))
@@ -79,12 +79,12 @@ def gathered_part(data: bytes, kind: type[msgspec.Struct], name: str, *, is_list
 
 def document_of(value: msgspec.Struct) -> dict[str, Any]:
     """The JSON object of a struct that keeps unknown fields in its `extra`; what is None is left out."""
-    fields = {name: getattr(value, field) for field, name in _names(type(value)).items()}
+    fields = {name: getattr(value, field) for field, name in json_names(type(value)).items()}
     extra: dict[str, Any] = getattr(value, EXTRA)
     return {name: field for name, field in fields.items() if field is not None} | extra
 
 
-def _names(kind: type[msgspec.Struct]) -> dict[str, str]:
+def json_names(kind: type[msgspec.Struct]) -> dict[str, str]:
     """What each field is called in JSON, but for `extra`."""
     return {field.name: field.encode_name for field in msgspec.structs.fields(kind) if field.name != EXTRA}
 
