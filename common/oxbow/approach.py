@@ -22,6 +22,7 @@ from shapely.ops import substring
 from oxbow.contracts import FloatArray, FreeSpace, Place, Vehicle
 from oxbow.errors import Infeasible
 from oxbow.route import RouteMethod, Router, make_router
+from oxbow.tolerances import ROUNDING_M
 
 __all__ = ["Approach", "Harbour"]
 
@@ -31,8 +32,6 @@ HALVINGS = 8
 """How often that distance may be halved until both ways fit."""
 GATES = 48
 """Places of a share's rim that may be its gate, at most about."""
-ROUNDING_M = 1e-6
-"""Places nearer to each other than this are one."""
 OFF_M = 1e-2
 """A leg that strays so little from the water stays in it: what the certificate takes for the shore."""
 FAR = 0.25

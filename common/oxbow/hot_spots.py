@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely import Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Geometries
 from oxbow.contracts import HotSpot
 from oxbow.errors import InvalidMission
 from oxbow.frame import Frame
@@ -133,7 +133,7 @@ def _areas(geometry: BaseGeometry, swath_m: float) -> list[Polygon]:
     return [part for part in shapely.get_parts(areas) if part.area > 0]
 
 
-def _in_order(areas: list[Polygon], given: npt.NDArray[np.object_]) -> list[Polygon]:
+def _in_order(areas: list[Polygon], given: Geometries) -> list[Polygon]:
     """Areas in the order of the geometries that they are made of, which clipping and uniting them may change."""
     return sorted(areas, key=lambda area: int(np.nanargmin(shapely.distance(given, area))))
 

@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import Geometries, Indices
 from oxbow.contracts import FloatArray
+from oxbow.tolerances import ROUNDING
 
 __all__ = [
     "angles_rad",
@@ -28,10 +29,6 @@ __all__ = [
     "triangulated",
     "twins_of",
 ]
-
-
-ROUNDING = 2.0**-48
-"""A triangle lower than this share of the greatest coordinate is flat, but for rounding."""
 
 
 def triangulated(faces: BaseGeometry | Geometries) -> tuple[FloatArray, Indices]:

@@ -12,6 +12,7 @@ from shapely import MultiPolygon, Polygon, STRtree, box
 from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray, WeightedArea
 from oxbow.frame import Frame
 from oxbow.prior import PriorModel
@@ -80,7 +81,7 @@ class _Weighted:
     areas: npt.NDArray[Any]
     weights: FloatArray
 
-    def where(self, chosen: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> _Weighted:
+    def where(self, chosen: Mask | Indices) -> _Weighted:
         return _Weighted(self.areas[chosen], self.weights[chosen])
 
     def parts(self) -> _Weighted:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from oxbow.arrays import Indices
 from oxbow.errors import InvalidMission
 from oxbow_assignment.assignment import Assignment, assignment_of
 from oxbow_assignment.clustering import Clusters, cluster_by_radius, fuzzy_c_means, k_means
@@ -20,7 +21,7 @@ from oxbow_assignment.exchange import exchanged
 from oxbow_assignment.insertion import inserted, traded, trimmed
 from oxbow_assignment.matching import match
 from oxbow_assignment.ordering import EXACT_MOST, best_path, exact_path
-from oxbow_assignment.problem import IntArray, Problem
+from oxbow_assignment.problem import Problem
 from oxbow_assignment.pseudo_coordinates import PseudoCoordinates, pseudo_coordinates
 
 __all__ = ["ClusterMethod", "Clustered", "Clustering", "assign", "cluster_paths", "mended"]
@@ -96,9 +97,9 @@ class Clustered:
     """
 
     assignment: Assignment
-    targets: IntArray
+    targets: Indices
     clusters: Clusters | None
-    owners: IntArray
+    owners: Indices
     stress: float
 
 
@@ -121,7 +122,7 @@ def assign(problem: Problem, clustering: Clustering | None = None) -> Clustered:
 
 
 def _by_clusters(
-    problem: Problem, targets: IntArray, coordinates: PseudoCoordinates, clusters: Clusters
+    problem: Problem, targets: Indices, coordinates: PseudoCoordinates, clusters: Clusters
 ) -> Clustered:
     owners = match(problem, clusters, targets)
     paths = cluster_paths(problem, targets, clusters, owners)
@@ -129,7 +130,7 @@ def _by_clusters(
     return Clustered(assignment, targets, clusters, owners, coordinates.stress)
 
 
-def cluster_paths(problem: Problem, targets: IntArray, clusters: Clusters, owners: IntArray) -> list[IntArray]:
+def cluster_paths(problem: Problem, targets: Indices, clusters: Clusters, owners: Indices) -> list[Indices]:
     """Each vehicle's path through its own clusters, as far as its range allows: all that the report does."""
     own = owners[clusters.labels]
     return [
@@ -138,7 +139,7 @@ def cluster_paths(problem: Problem, targets: IntArray, clusters: Clusters, owner
     ]
 
 
-def mended(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -> list[IntArray]:
+def mended(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
     """Paths after insertions, exchanges and trades, in turns until nothing more is gained.
 
     Parameters
@@ -156,7 +157,7 @@ def mended(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -> 
         paths = traded_paths
 
 
-def _exact(problem: Problem, path: IntArray, held: int) -> IntArray:
+def _exact(problem: Problem, path: Indices, held: int) -> Indices:
     """A path in the best order behind its held targets, if it is short enough to find it."""
     if len(path) - held > EXACT_MOST + 2:
         return path

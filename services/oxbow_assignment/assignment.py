@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow_assignment.ordering import path_length
-from oxbow_assignment.problem import IntArray, Objective, Problem
+from oxbow_assignment.problem import Objective, Problem
 
 __all__ = ["Assignment", "Tour", "Unserved", "assignment_of", "tour_length", "tour_lengths"]
 
@@ -86,17 +87,17 @@ class Assignment:
         return -self.value, self.cost_s
 
 
-def tour_length(problem: Problem, path: IntArray) -> float:
+def tour_length(problem: Problem, path: Indices) -> float:
     """Metres of one vehicle's path; 0 without targets."""
     return path_length(problem.finite, path) if len(path) > 2 else 0.0
 
 
-def tour_lengths(problem: Problem, paths: Sequence[IntArray]) -> FloatArray:
+def tour_lengths(problem: Problem, paths: Sequence[Indices]) -> FloatArray:
     """Metres of each vehicle's path."""
     return np.array([tour_length(problem, path) for path in paths])
 
 
-def assignment_of(problem: Problem, paths: Sequence[IntArray]) -> Assignment:
+def assignment_of(problem: Problem, paths: Sequence[Indices]) -> Assignment:
     """The assignment in which each vehicle goes its path: rows of the distances, start first and recovery last."""
     lengths = tour_lengths(problem, paths)
     tours = tuple(
@@ -119,7 +120,7 @@ def assignment_of(problem: Problem, paths: Sequence[IntArray]) -> Assignment:
 
 
 def _unserved(
-    problem: Problem, paths: Sequence[IntArray], lengths: FloatArray, left: IntArray
+    problem: Problem, paths: Sequence[Indices], lengths: FloatArray, left: Indices
 ) -> tuple[Unserved, ...]:
     detours = np.array([_detours(problem, path, left) for path in paths]).reshape(len(paths), len(left))
     detours = np.where(problem.has_role[:, left], detours, np.inf)
@@ -129,7 +130,7 @@ def _unserved(
     )
 
 
-def _detours(problem: Problem, path: IntArray, targets: IntArray) -> FloatArray:
+def _detours(problem: Problem, path: Indices, targets: Indices) -> FloatArray:
     """By how much each target would lengthen a path, where it does so least; shape (n,)."""
     away = problem.distances[np.ix_(targets, path)]
     known = problem.finite[path[:-1], path[1:]] if len(path) > 2 else np.zeros(1)

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow.errors import InvalidMission
-from oxbow_assignment.problem import IntArray
 from oxbow_assignment.pseudo_coordinates import PseudoCoordinates
 
 __all__ = ["Clusters", "cluster_by_radius", "faded", "fuzzy_c_means", "k_means", "mean_distances"]
@@ -41,7 +41,7 @@ class Clusters:
         How much each target belongs to each cluster; rows add up to 1, and are 0 or 1 for k-means.
     """
 
-    labels: IntArray
+    labels: Indices
     centres: FloatArray
     memberships: FloatArray
 
@@ -208,7 +208,7 @@ def _spread(places: FloatArray, k: int, weights: FloatArray, seed: int) -> Float
     return places[chosen]
 
 
-def _fill_empty(labels: IntArray, squares: FloatArray, k: int) -> None:
+def _fill_empty(labels: Indices, squares: FloatArray, k: int) -> None:
     """Give every cluster without targets the target that is farthest from its own centre, in place."""
     for empty in np.flatnonzero(np.bincount(labels, minlength=k) == 0):
         spare = np.bincount(labels, minlength=k)[labels] > 1

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow_assignment.layout import Layout
 from oxbow_assignment.ordering import LEAST_GAIN, SEGMENT, improved_path
-from oxbow_assignment.problem import IntArray, Problem
+from oxbow_assignment.problem import Problem
 
 __all__ = ["exchanged", "in_order"]
 
@@ -24,7 +25,7 @@ NEAR = 10
 """How many near targets of each target are looked at."""
 
 
-def exchanged(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -> list[IntArray]:
+def exchanged(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
     """Paths between which no move lowers the objective, each within its vehicle's range.
 
     Parameters
@@ -46,12 +47,12 @@ def exchanged(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) 
             paths[vehicle] = in_order(problem, path, held[vehicle])
 
 
-def in_order(problem: Problem, path: IntArray, held: int) -> IntArray:
+def in_order(problem: Problem, path: Indices, held: int) -> Indices:
     """A path improved behind its held targets."""
     return np.concatenate([path[:held], improved_path(problem.finite, path[held:])])
 
 
-def _near(problem: Problem) -> IntArray:
+def _near(problem: Problem) -> Indices:
     """The nearest targets of every target and of every start, shape (n + v, k)."""
     away = problem.finite[: problem.count + len(problem.vehicles), : problem.count].copy()
     away[np.diag_indices(problem.count)] = np.inf
@@ -64,19 +65,19 @@ class _Moves:
     """Moves of one kind: what each gains, the two tours it changes, and the new path of each of these."""
 
     gains: FloatArray
-    one: IntArray
-    other: IntArray
-    paths: Callable[[int], dict[int, IntArray]]
+    one: Indices
+    other: Indices
+    paths: Callable[[int], dict[int, Indices]]
 
 
-def _best_apart(kinds: Sequence[_Moves], layout: Layout) -> dict[int, IntArray]:
+def _best_apart(kinds: Sequence[_Moves], layout: Layout) -> dict[int, Indices]:
     """The paths that the best moves make, each on tours that no better one has touched."""
     least = LEAST_GAIN * float(layout.problem.strain(layout.lengths_m, np.arange(len(layout.lengths_m))).sum())
     gains = np.concatenate([moves.gains for moves in kinds])
     origin = np.concatenate([np.full(len(moves.gains), kind) for kind, moves in enumerate(kinds)])
     index = np.concatenate([np.arange(len(moves.gains)) for moves in kinds])
     worth = np.flatnonzero(gains > least)
-    changed: dict[int, IntArray] = {}
+    changed: dict[int, Indices] = {}
     for best in worth[np.argsort(-gains[worth], kind="stable")].tolist():
         moves, chosen = kinds[origin[best]], int(index[best])
         if int(moves.one[chosen]) not in changed and int(moves.other[chosen]) not in changed:
@@ -84,7 +85,7 @@ def _best_apart(kinds: Sequence[_Moves], layout: Layout) -> dict[int, IntArray]:
     return changed
 
 
-def _relocations(layout: Layout, near: IntArray, length: int) -> _Moves:
+def _relocations(layout: Layout, near: Indices, length: int) -> _Moves:
     """Move a segment of `length` targets, either way round, next to a near target or to a tour's front."""
     rows, metres = layout.rows, layout.problem.finite
     at = np.flatnonzero(layout.is_free[: len(rows) - length + 1] & layout.is_free[length - 1 :])
@@ -109,7 +110,7 @@ def _relocations(layout: Layout, near: IntArray, length: int) -> _Moves:
     taken_m = layout.lengths_m[taker] - layout.edge_m[edges] + inside_m + np.minimum(kept_m, turned_m)
     allowed = np.logical_and.reduce([layout.problem.has_role[taker, rows[at + i]] for i in range(length)])
 
-    def paths(index: int) -> dict[int, IntArray]:
+    def paths(index: int) -> dict[int, Indices]:
         one, other, place = int(giver[index]), int(taker[index]), int(at[index])
         moved = rows[place : place + length][:: -1 if turned_m[index] < kept_m[index] else 1]
         inner = place - layout.firsts[one]
@@ -121,7 +122,7 @@ def _relocations(layout: Layout, near: IntArray, length: int) -> _Moves:
     return _Moves(layout.gains(giver, given_m, taker, taken_m, allowed), giver, taker, paths)
 
 
-def _swaps(layout: Layout, near: IntArray) -> _Moves:
+def _swaps(layout: Layout, near: Indices) -> _Moves:
     """Let two near targets of different tours take each other's place."""
     rows, metres = layout.rows, layout.problem.finite
     at = np.flatnonzero(layout.is_free)
@@ -131,12 +132,12 @@ def _swaps(layout: Layout, near: IntArray) -> _Moves:
     at, with_ = at[keep], with_[keep]
     one, other = layout.tour[at], layout.tour[with_]
 
-    def length(here: IntArray, target: IntArray) -> FloatArray:
+    def length(here: Indices, target: Indices) -> FloatArray:
         left, right = rows[here - 1], rows[here + 1]
         changed: FloatArray = metres[left, target] + metres[target, right] - layout.edge_m[here - 1]
         return layout.lengths_m[layout.tour[here]] + changed - layout.edge_m[here]
 
-    def paths(index: int) -> dict[int, IntArray]:
+    def paths(index: int) -> dict[int, Indices]:
         changed = {}
         for here, there in ((at[index], with_[index]), (with_[index], at[index])):
             tour = int(layout.tour[here])
@@ -149,7 +150,7 @@ def _swaps(layout: Layout, near: IntArray) -> _Moves:
     return _Moves(gains, one, other, paths)
 
 
-def _tails(layout: Layout, near: IntArray) -> _Moves:
+def _tails(layout: Layout, near: Indices) -> _Moves:
     """Cut two tours and exchange what follows, so that near targets meet: 2-opt*.
 
     J.-Y. Potvin and J.-M. Rousseau (1995). Each vehicle still ends at its own recovery. Vehicles must have the
@@ -163,7 +164,7 @@ def _tails(layout: Layout, near: IntArray) -> _Moves:
     one, other = layout.tour[cut], layout.tour[join]
     one_m, other_m = _spliced_m(layout, cut, join), _spliced_m(layout, join - 1, cut + 1)
 
-    def paths(index: int) -> dict[int, IntArray]:
+    def paths(index: int) -> dict[int, Indices]:
         tours = int(one[index]), int(other[index])
         first, second = (layout.paths[tour] for tour in tours)
         i, j = cut[index] + 1 - layout.firsts[tours[0]], join[index] - layout.firsts[tours[1]]
@@ -178,7 +179,7 @@ def _tails(layout: Layout, near: IntArray) -> _Moves:
     return _Moves(layout.gains(one, one_m, other, other_m, alike[one, other]), one, other, paths)
 
 
-def _spliced_m(layout: Layout, head: IntArray, tail: IntArray) -> FloatArray:
+def _spliced_m(layout: Layout, head: Indices, tail: Indices) -> FloatArray:
     """Metres of paths up to the places `head`, then on from the places `tail` of other paths to their own ends."""
     metres, rows, along_m = layout.problem.finite, layout.rows, layout.along_m
     recovery, last = layout.lasts[layout.tour[head]], layout.lasts[layout.tour[tail]] - 1

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow_assignment.assignment import tour_length
-from oxbow_assignment.problem import ROUNDING, IntArray, Problem
+from oxbow_assignment.problem import ROUNDING, Problem
 
 __all__ = ["inserted", "traded", "trimmed"]
 
@@ -21,8 +22,8 @@ LEAST_SAVED_S = 1e-6
 
 
 def trimmed(
-    problem: Problem, vehicle: int, path: IntArray, *, held: int = 0, wanted: np.intp | None = None
-) -> IntArray:
+    problem: Problem, vehicle: int, path: Indices, *, held: int = 0, wanted: np.intp | None = None
+) -> Indices:
     """A path within its vehicle's range, of targets that it may visit.
 
     While it is too long, the target goes that saves most metres for its value; a `wanted` target goes after all
@@ -40,7 +41,7 @@ def trimmed(
     return path
 
 
-def inserted(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -> list[IntArray]:
+def inserted(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
     """The paths with every target put in that fits: always the one that costs least for its value.
 
     Parameters
@@ -66,7 +67,7 @@ def inserted(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -
     return paths
 
 
-def traded(problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -> list[IntArray]:
+def traded(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
     """The paths with targets that nobody visits put in the place of others, where that is worth it.
 
     A target is put in although it does not fit, and others are trimmed: that stays if the path then serves more
@@ -91,12 +92,12 @@ class _Trade:
     """A path with a target put in and others taken out: the value and the seconds that this adds."""
 
     vehicle: int
-    path: IntArray
+    path: Indices
     value: float
     added_s: float
 
 
-def _trade(problem: Problem, vehicle: int, path: IntArray, held: int, target: np.intp) -> _Trade:
+def _trade(problem: Problem, vehicle: int, path: Indices, held: int, target: np.intp) -> _Trade:
     before, after = path[held:-1], path[held + 1 :]
     detours = problem.finite[before, target] + problem.finite[target, after] - problem.finite[before, after]
     longer = np.insert(path, held + 1 + int(detours.argmin()), target)
@@ -111,13 +112,13 @@ class _Offers:
     """For each target of a pool, where one path takes it best, and at what cost; infinite where it cannot."""
 
     costs: FloatArray
-    places: IntArray
+    places: Indices
 
     def without(self, chosen: int) -> _Offers:
         return _Offers(np.delete(self.costs, chosen), np.delete(self.places, chosen))
 
 
-def _offers(problem: Problem, vehicle: int, path: IntArray, held: int, pool: IntArray) -> _Offers:
+def _offers(problem: Problem, vehicle: int, path: Indices, held: int, pool: Indices) -> _Offers:
     before, after = path[held:-1], path[held + 1 :]
     length_m = tour_length(problem, path)
     kept_m = problem.finite[before, after] if len(path) > 2 else np.zeros(1)

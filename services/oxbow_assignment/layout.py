@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray
-from oxbow_assignment.problem import ROUNDING, BoolArray, IntArray, Problem
+from oxbow_assignment.problem import ROUNDING, Problem
 
 __all__ = ["Layout"]
 
@@ -40,21 +41,21 @@ class Layout:
     """
 
     problem: Problem
-    paths: Sequence[IntArray]
-    rows: IntArray
-    tour: IntArray
+    paths: Sequence[Indices]
+    rows: Indices
+    tour: Indices
     along_m: FloatArray
     edge_m: FloatArray
-    is_open: BoolArray
-    is_free: BoolArray
-    place: IntArray
-    firsts: IntArray
-    fronts: IntArray
-    lasts: IntArray
+    is_open: Mask
+    is_free: Mask
+    place: Indices
+    firsts: Indices
+    fronts: Indices
+    lasts: Indices
     lengths_m: FloatArray
 
     @classmethod
-    def of(cls, problem: Problem, paths: Sequence[IntArray], held: Sequence[int]) -> Layout:
+    def of(cls, problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> Layout:
         """Lay out paths; their first `held` targets stay in front."""
         sizes = np.array([len(path) for path in paths])
         rows, tour = np.concatenate(paths), np.repeat(np.arange(len(paths)), sizes)
@@ -77,13 +78,13 @@ class Layout:
             problem, paths, rows, tour, along_m, edge_m, is_open, is_free, place, firsts, fronts, lasts, lengths_m
         )
 
-    def joint_m(self, left: IntArray, right: IntArray) -> FloatArray:
+    def joint_m(self, left: Indices, right: Indices) -> FloatArray:
         """Metres between the rows at two places of one path once nothing is between them: 0 if that empties it."""
         is_empty = (left == self.firsts[self.tour[left]]) & (right == self.lasts[self.tour[right]])
         return np.where(is_empty, 0.0, self.problem.finite[self.rows[left], self.rows[right]])
 
     def gains(
-        self, one: IntArray, one_m: FloatArray, other: IntArray, other_m: FloatArray, possible: BoolArray
+        self, one: Indices, one_m: FloatArray, other: Indices, other_m: FloatArray, possible: Mask
     ) -> FloatArray:
         """What the objective gains if two tours get new lengths; -inf where a tour would be too long."""
         problem = self.problem

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow_assignment.clustering import Clusters
-from oxbow_assignment.problem import IntArray, Problem
+from oxbow_assignment.problem import Problem
 
 __all__ = ["match"]
 
@@ -15,7 +16,7 @@ OUT_OF_REACH = 1e3
 """How many times as much as the costliest target a target counts that a vehicle cannot visit."""
 
 
-def match(problem: Problem, clusters: Clusters, targets: IntArray) -> IntArray:
+def match(problem: Problem, clusters: Clusters, targets: Indices) -> Indices:
     """The vehicle of each cluster, of least sum of mean costs (Innocenti, Pollini and Bracci 2006, 4.2 and 4.4).
 
     A cluster costs a vehicle the mean duration of its routes to the cluster's targets. With more clusters than

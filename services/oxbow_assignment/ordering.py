@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
-from oxbow_assignment.problem import IntArray
 
 __all__ = ["EXACT_MOST", "best_path", "exact_path", "improved_path", "inserted_path", "neighbours", "path_length"]
 
@@ -28,12 +28,12 @@ LEAST_GAIN = 1e-9
 """Least gain, as a share of the path's length, that is not rounding."""
 
 
-def path_length(distances: FloatArray, path: IntArray) -> float:
+def path_length(distances: FloatArray, path: Indices) -> float:
     """Metres along a path."""
     return float(distances[path[:-1], path[1:]].sum())
 
 
-def best_path(distances: FloatArray, path: IntArray) -> IntArray:
+def best_path(distances: FloatArray, path: Indices) -> Indices:
     """The rows of a path in a better order: the shortest up to `EXACT_MOST` targets, a local optimum above.
 
     Parameters
@@ -48,7 +48,7 @@ def best_path(distances: FloatArray, path: IntArray) -> IntArray:
     return improved_path(distances, inserted_path(distances, path))
 
 
-def exact_path(distances: FloatArray, path: IntArray) -> IntArray:
+def exact_path(distances: FloatArray, path: Indices) -> Indices:
     """The shortest path by dynamic programming over sets (M. Held and R. M. Karp, 1962; R. Bellman, 1962).
 
     `lengths[s, j]` is the least length from the start through the set s, a bit mask, ending at target j; sets
@@ -73,7 +73,7 @@ def exact_path(distances: FloatArray, path: IntArray) -> IntArray:
     return np.array([start, *targets[order[::-1]], end])
 
 
-def inserted_path(distances: FloatArray, path: IntArray) -> IntArray:
+def inserted_path(distances: FloatArray, path: Indices) -> Indices:
     """A path by farthest insertion (D. J. Rosenkrantz, R. E. Stearns and P. M. Lewis, 1977)."""
     left, path = path[1:-1], path[[0, -1]]
     nearest = distances[np.ix_(left, path)].min(axis=1)
@@ -88,7 +88,7 @@ def inserted_path(distances: FloatArray, path: IntArray) -> IntArray:
     return path
 
 
-def improved_path(distances: FloatArray, path: IntArray) -> IntArray:
+def improved_path(distances: FloatArray, path: Indices) -> Indices:
     """A path that no 2-opt and no Or-opt move between neighbours shortens, its first and last row kept.
 
     2-opt reverses a stretch of the path (G. A. Croes, 1958), Or-opt moves up to `SEGMENT` targets elsewhere,
@@ -110,12 +110,12 @@ def improved_path(distances: FloatArray, path: IntArray) -> IntArray:
         order = order[best.positions]
 
 
-def neighbours(distances: FloatArray) -> IntArray:
+def neighbours(distances: FloatArray) -> Indices:
     """The nearest rows of every row, shape (m, k), itself left out."""
     away = distances.copy()
     np.fill_diagonal(away, np.inf)
     k = min(NEIGHBOURS, len(away) - 1)
-    nearest: IntArray = np.argpartition(away, k - 1, axis=1)[:, :k]
+    nearest: Indices = np.argpartition(away, k - 1, axis=1)[:, :k]
     return nearest
 
 
@@ -124,10 +124,10 @@ class _Move:
     """What a move gains, and which position of the path before stands at each position after it."""
 
     gain_m: float
-    positions: IntArray
+    positions: Indices
 
 
-def _best_two_opt(local: FloatArray, order: IntArray, near: IntArray) -> _Move:
+def _best_two_opt(local: FloatArray, order: Indices, near: Indices) -> _Move:
     """Reverse what is between two cuts, so that a row and one of its neighbours meet."""
     position = np.argsort(order)
     here, there = np.arange(len(order))[:, None], position[near[order]]
@@ -145,7 +145,7 @@ def _best_two_opt(local: FloatArray, order: IntArray, near: IntArray) -> _Move:
     return _Move(float(gains[best]), positions)
 
 
-def _best_or_opt(local: FloatArray, order: IntArray, near: IntArray) -> _Move:
+def _best_or_opt(local: FloatArray, order: Indices, near: Indices) -> _Move:
     """Move a segment between a neighbour of one of its ends and the row before or after that neighbour."""
     position = np.argsort(order)
     moves = []

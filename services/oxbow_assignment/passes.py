@@ -10,8 +10,8 @@ import shapely
 from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
-from oxbow_assignment.problem import IntArray
 
 __all__ = ["chord", "parallel_passes", "passes_needed"]
 
@@ -120,7 +120,7 @@ def _bounds(geometry: BaseGeometry, turn: FloatArray) -> FloatArray:
     return np.concatenate([points.min(axis=0), points.max(axis=0)])
 
 
-def _merged(band: IntArray, low: FloatArray, high: FloatArray) -> Iterator[tuple[int, float, float]]:
+def _merged(band: Indices, low: FloatArray, high: FloatArray) -> Iterator[tuple[int, float, float]]:
     """Intervals of one band that overlap, joined: band, low and high end of each."""
     order = np.lexsort([low, band])
     at, start, end = -1, 0.0, 0.0

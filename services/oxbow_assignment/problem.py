@@ -8,15 +8,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray, Role, Vehicle
 from oxbow.errors import InvalidMission
 
-__all__ = ["ROUNDING", "BoolArray", "IntArray", "Objective", "Problem", "require_distances"]
+__all__ = ["ROUNDING", "Objective", "Problem", "require_distances"]
 
-BoolArray = npt.NDArray[np.bool_]
-IntArray = npt.NDArray[np.intp]
 
 ROUNDING = 1e-12
 """Lengths that are the same sum in another order differ by less than this share."""
@@ -91,7 +89,7 @@ class Problem:
         """How many targets there are."""
         return len(self.distances) - 2 * len(self.vehicles)
 
-    def path(self, vehicle: int, targets: Sequence[int] | IntArray) -> IntArray:
+    def path(self, vehicle: int, targets: Sequence[int] | Indices) -> Indices:
         """The rows that a vehicle passes: its start, its targets and its recovery."""
         return np.array([self.starts[vehicle], *targets, self.recoveries[vehicle]])
 
@@ -101,12 +99,12 @@ class Problem:
         return slice(0, self.count)
 
     @property
-    def starts(self) -> IntArray:
+    def starts(self) -> Indices:
         """Each vehicle's row."""
         return self.count + np.arange(len(self.vehicles))
 
     @property
-    def recoveries(self) -> IntArray:
+    def recoveries(self) -> Indices:
         """The row of each vehicle's recovery."""
         return self.count + len(self.vehicles) + np.arange(len(self.vehicles))
 
@@ -120,7 +118,7 @@ class Problem:
         """Each vehicle's speed, shape (v,)."""
         return np.array([vehicle.speed_mps for vehicle in self.vehicles])
 
-    def strain(self, lengths_m: FloatArray, vehicles: IntArray) -> FloatArray:
+    def strain(self, lengths_m: FloatArray, vehicles: Indices) -> FloatArray:
         """What tours of these lengths add to the objective, each for the vehicle beside it.
 
         The longest duration alone does not tell good moves between other tours: for `MAKESPAN` the strain is a
@@ -142,14 +140,14 @@ class Problem:
         return self.distances[self.starts, self.targets] + self.distances[self.recoveries, self.targets]
 
     @cached_property
-    def has_role(self) -> BoolArray:
+    def has_role(self) -> Mask:
         """Which vehicle has the role that each target asks for, shape (v, n)."""
         roles = self.roles or (None,) * self.count
         allowed = [[role in (None, vehicle.role) for role in roles] for vehicle in self.vehicles]
         return np.array(allowed, dtype=bool).reshape(len(self.vehicles), self.count)
 
     @cached_property
-    def can_visit(self) -> BoolArray:
+    def can_visit(self) -> Mask:
         """Which vehicle has the role and the range for each target, shape (v, n)."""
         return self.has_role & (self.there_and_back_m <= self.lengths_m[:, None])
 

@@ -11,8 +11,9 @@ import numpy as np
 from pyvrp import Client, Depot, Location, ProblemData, Solution, VehicleType, solve
 from pyvrp.stop import NoImprovement
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
-from oxbow_assignment.problem import IntArray, Problem
+from oxbow_assignment.problem import Problem
 
 __all__ = ["solved"]
 
@@ -23,7 +24,7 @@ PRIZE = 2.0
 """How many times the durations of all vehicles' whole ranges the least value weighs, so that value comes first."""
 
 
-def solved(problem: Problem, *, patience: int, seed: int, within_s: float | None = None) -> list[IntArray]:
+def solved(problem: Problem, *, patience: int, seed: int, within_s: float | None = None) -> list[Indices]:
     """Paths of least total duration, one a vehicle, among those that serve the greatest value.
 
     Parameters
@@ -77,7 +78,7 @@ def _steps(figures: FloatArray) -> Any:
     return np.ceil(figures * PER_UNIT).astype(np.int64)
 
 
-def _paths(problem: Problem, solution: Solution) -> list[IntArray]:
+def _paths(problem: Problem, solution: Solution) -> list[Indices]:
     tours: list[list[int]] = [[] for _ in problem.vehicles]
     for route in solution.routes():
         tours[route.vehicle_type()] = [stop.idx for stop in route if stop.is_client()]

@@ -11,11 +11,12 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from oxbow.arrays import Indices
 from oxbow.errors import InvalidMission
 from oxbow_assignment.assign import mended
 from oxbow_assignment.assignment import Assignment, assignment_of
 from oxbow_assignment.insertion import trimmed
-from oxbow_assignment.problem import IntArray, Problem
+from oxbow_assignment.problem import Problem
 
 __all__ = ["Reassignment", "reassign"]
 
@@ -87,7 +88,7 @@ def reassign(problem: Problem, tours: Sequence[Sequence[int]], *, hysteresis_s: 
 class _Candidate:
     """Paths on which the vehicles in `bound` keep their current target."""
 
-    paths: Sequence[IntArray]
+    paths: Sequence[Indices]
     bound: frozenset[int]
     assignment: Assignment
     changed: tuple[int, ...]
@@ -96,7 +97,7 @@ class _Candidate:
     def of(
         cls,
         problem: Problem,
-        paths: Sequence[IntArray],
+        paths: Sequence[Indices],
         bound: frozenset[int],
         current: Sequence[int | None],
     ) -> _Candidate:
@@ -113,7 +114,7 @@ class _Candidate:
         return -self.assignment.value, self.assignment.cost_s + hysteresis_s * len(self.changed)
 
 
-def _first(path: IntArray) -> int | None:
+def _first(path: Indices) -> int | None:
     """The first target of a path."""
     return int(path[1]) if len(path) > 2 else None
 

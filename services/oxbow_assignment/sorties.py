@@ -10,18 +10,17 @@ import numpy as np
 import shapely
 from shapely import LineString
 
+from oxbow.arrays import Indices
 from oxbow.errors import Internal
+from oxbow.tolerances import ROUNDING_M
 from oxbow_assignment.assign import Clustering
 from oxbow_assignment.division import Part
 from oxbow_assignment.fleet import Fleet, Ways
 from oxbow_assignment.joint import Solution, solve
 from oxbow_assignment.lines import joined
-from oxbow_assignment.problem import IntArray, Objective, Problem
+from oxbow_assignment.problem import Objective, Problem
 
 __all__ = ["Journey", "Schedule", "scheduled"]
-
-ROUNDING_M = 1e-6
-"""A path this near to the free space is in it."""
 
 JOINT_MOST = 30
 """More parts than these are not given to the joint optimiser: it would take longer than all else."""
@@ -104,7 +103,7 @@ def scheduled(parts: Sequence[Part], fleet: Fleet, *, seed: int = 0) -> Schedule
     return Schedule(tuple(rounds), first)
 
 
-def _problem(parts: Sequence[Part], fleet: Fleet, ways: Ways, left: IntArray) -> Problem:
+def _problem(parts: Sequence[Part], fleet: Fleet, ways: Ways, left: Indices) -> Problem:
     """The problem of what is left: mean ways between parts, with half of the parts' lengths on either side."""
     count, boats = len(left), len(fleet.slaves)
     half_m = ways.lengths_m[left] / 2
@@ -121,7 +120,7 @@ def _problem(parts: Sequence[Part], fleet: Fleet, ways: Ways, left: IntArray) ->
     )
 
 
-def _journey(slave: int, tour: IntArray, parts: Sequence[Part], fleet: Fleet, ways: Ways) -> Journey:
+def _journey(slave: int, tour: Indices, parts: Sequence[Part], fleet: Fleet, ways: Ways) -> Journey:
     """The path of one tour, its parts turned the best way, checked."""
     lines = [
         parts[number].line.reverse() if backwards else parts[number].line
@@ -140,10 +139,10 @@ def _journey(slave: int, tour: IntArray, parts: Sequence[Part], fleet: Fleet, wa
     return Journey(slave, tuple(tour.tolist()), path, tuple(routes))
 
 
-def _turns(slave: int, tour: IntArray, ways: Ways) -> list[bool]:
+def _turns(slave: int, tour: Indices, ways: Ways) -> list[bool]:
     """Which parts to travel backwards, for the shortest path: by dynamic programming along the tour."""
     metres = ways.starts[slave, tour[0]]
-    came_from: list[IntArray] = []
+    came_from: list[Indices] = []
     for before, after in pairwise(tour):
         # Who enters at one end leaves at the other.
         longer = metres[:, None] + ways.between[before, after][::-1]

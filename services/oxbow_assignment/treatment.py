@@ -12,13 +12,13 @@ from scipy.spatial import KDTree
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray, HotSpot
 from oxbow.errors import InvalidMission
 from oxbow.route import Router
 from oxbow_assignment.lines import joined
 from oxbow_assignment.ordering import improved_path
 from oxbow_assignment.passes import chord, parallel_passes, passes_needed
-from oxbow_assignment.problem import IntArray
 
 __all__ = ["COVERED", "Treatment", "treatment_of"]
 
@@ -164,7 +164,7 @@ def _nearest_next(apart: FloatArray) -> list[int]:
     return rows
 
 
-def _as_path(apart: FloatArray, rows: list[int]) -> tuple[FloatArray, IntArray]:
+def _as_path(apart: FloatArray, rows: list[int]) -> tuple[FloatArray, Indices]:
     """Distances and a path for `improved_path`, whose first and last row stand for nowhere.
 
     Both ends of a pass are 0 m apart, and all others so far that passes stay whole.

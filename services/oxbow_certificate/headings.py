@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 from shapely import LineString
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow_certificate.axes import Paths, segment_ends
 
@@ -58,7 +58,7 @@ def _count_left_turns(heading: FloatArray, corner_at: FloatArray, reach_m: float
     return int(len(turning) and 1 + np.count_nonzero(np.diff(corner_at[turning]) > reach_m))
 
 
-def _range_minimum(values: FloatArray, first: npt.NDArray[np.intp], last: npt.NDArray[np.intp]) -> FloatArray:
+def _range_minimum(values: FloatArray, first: Indices, last: Indices) -> FloatArray:
     """Minimum of ``values[first : last + 1]`` for each pair, by runs of 2^k (Bender and Farach-Colton 2000)."""
     least = np.empty(len(first))
     level = np.frexp(last - first + 1)[1] - 1

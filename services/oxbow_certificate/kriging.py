@@ -13,11 +13,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from scipy.spatial import KDTree
 from shapely import LineString
 
+from oxbow.arrays import Mask
 from oxbow.contracts import FloatArray, Variogram, VariogramModel
 from oxbow_certificate.axes import Paths
 
@@ -124,9 +124,7 @@ def local_variance(samples: FloatArray, places: FloatArray, variogram: Variogram
     return np.concatenate(variances)
 
 
-def _variance(
-    samples: FloatArray, distance_m: FloatArray, counts: npt.NDArray[np.bool_], variogram: Variogram
-) -> FloatArray:
+def _variance(samples: FloatArray, distance_m: FloatArray, counts: Mask, variogram: Variogram) -> FloatArray:
     """Variances (n,) at places from k samples each.
 
     The weights w minimise 1 - 2 w.c + w.C w where they sum to 1; C is the correlation of the samples with one

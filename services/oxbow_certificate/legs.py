@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely import LineString, STRtree
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow_certificate.axes import main_direction, turned
 from oxbow_certificate.distance import segments_of
@@ -94,7 +94,7 @@ class _Pieces:
             ring_m=path.length if path.is_closed else math.inf,
         )
 
-    def least_distance(self, asked: npt.NDArray[np.intp], within_m: float, neighbours_m: float) -> float:
+    def least_distance(self, asked: Indices, within_m: float, neighbours_m: float) -> float:
         """Least distance from the ends `asked` to a piece of another leg that one faces; infinite without any."""
         points = np.asarray(shapely.points(self.ends[asked]))
         least_m = math.inf
@@ -106,9 +106,7 @@ class _Pieces:
             least_m = min(least_m, float(across_m.min(initial=math.inf)))
         return least_m
 
-    def _facing_distances(
-        self, end: npt.NDArray[np.intp], piece: npt.NDArray[np.intp], neighbours_m: float
-    ) -> FloatArray:
+    def _facing_distances(self, end: Indices, piece: Indices, neighbours_m: float) -> FloatArray:
         """Distances of the pairs of an end and a piece that are parallel, face each other, are no neighbours."""
         along = self.along[piece]
         way = self.ends[end] - self.ends[piece]

@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Mask
 from oxbow.contracts import FloatArray
 
 __all__ = ["Squares"]
@@ -38,7 +38,7 @@ class Squares:
         """From a square's centre to its corners."""
         return self.half_m * math.sqrt(2.0)
 
-    def where(self, keep: npt.NDArray[np.bool_]) -> Squares:
+    def where(self, keep: Mask) -> Squares:
         """The squares chosen by a mask of shape (n,)."""
         return Squares(self.centres[keep], self.half_m)
 

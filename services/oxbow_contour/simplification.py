@@ -6,17 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 
+from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray
 from oxbow_contour.rings import rings_of
-from oxbow_contour.strips import IndexArray, deviations, strip_ends
+from oxbow_contour.strips import deviations, strip_ends
 
 __all__ = ["Simplified", "simplify"]
 
-BoolArray = npt.NDArray[np.bool_]
 
 ROUNDING = 1e-9
 """Of distances, relative."""
@@ -94,12 +93,12 @@ class _Edges:
     """Simplified edges, each from point `first` to point `last`, and `follower`, the next edge of its ring."""
 
     points: FloatArray
-    first: IndexArray
-    last: IndexArray
-    follower: IndexArray
+    first: Indices
+    last: Indices
+    follower: Indices
 
     @classmethod
-    def between(cls, points: FloatArray, is_kept: BoolArray, starts: IndexArray, closing: IndexArray) -> _Edges:
+    def between(cls, points: FloatArray, is_kept: Mask, starts: Indices, closing: Indices) -> _Edges:
         """The edges between kept points; rings go from point `starts` to point `closing`."""
         kept = np.flatnonzero(is_kept)
         is_edge = ~np.isin(kept[:-1], closing)
@@ -109,19 +108,19 @@ class _Edges:
         return cls(points, first, last, follower)
 
     @property
-    def middle(self) -> IndexArray:
+    def middle(self) -> Indices:
         return (self.first + self.last) // 2
 
     @property
-    def is_strip(self) -> BoolArray:
+    def is_strip(self) -> Mask:
         """Whether an edge stands for more than one edge of the true contour."""
         return self.last - self.first > 1
 
-    def is_wide(self, tolerance_m: float) -> BoolArray:
+    def is_wide(self, tolerance_m: float) -> Mask:
         """Whether an edge is a strip that does not hold its points."""
         return self.is_strip & (deviations(self.points, self.first, self.last) > tolerance_m * (1 + ROUNDING))
 
-    def is_met(self) -> BoolArray:
+    def is_met(self) -> Mask:
         """Whether an edge is a strip that meets another edge than its neighbours."""
         strips = np.flatnonzero(self.is_strip)
         lines = np.asarray(

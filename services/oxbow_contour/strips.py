@@ -6,21 +6,20 @@ import itertools
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow.triangles import cross
 
 __all__ = ["deviations", "strip_ends"]
 
-IndexArray = npt.NDArray[np.intp]
 
 # A point strays from its edge sideways by at most WIDTH of the tolerance, and beyond the edge's end by at most
 # RETREAT of it; 0.8² + 0.6² = 1, so that it stays within the tolerance of the edge.
 WIDTH, RETREAT = 0.8, 0.6
 
 
-def strip_ends(ring: FloatArray, tolerance_m: float) -> IndexArray:
+def strip_ends(ring: FloatArray, tolerance_m: float) -> Indices:
     """Choose the vertices of a closed ring that its simplification keeps.
 
     In the spirit of IfShades, "incremental fuzzy shape description" (Rendas and Li 2016, section 1.2.1.1,
@@ -57,7 +56,7 @@ def strip_ends(ring: FloatArray, tolerance_m: float) -> IndexArray:
     return np.array(ends)
 
 
-def deviations(points: FloatArray, first: IndexArray, last: IndexArray) -> FloatArray:
+def deviations(points: FloatArray, first: Indices, last: Indices) -> FloatArray:
     """Largest distance from the points of each strip to its edge.
 
     Parameters

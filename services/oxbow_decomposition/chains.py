@@ -14,8 +14,8 @@ from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray
 from oxbow.sweep import to_sweep
 from oxbow_decomposition.boundary import distinct
@@ -166,14 +166,14 @@ def _of_walk(planar: FloatArray, heading_rad: float, grid: float) -> Iterator[Ex
         yield Extreme(place=floor.last, floor=floor, ceiling=ceiling, minimum=False, opens=False)
 
 
-def _rising(vertices: FloatArray) -> npt.NDArray[np.bool_]:
+def _rising(vertices: FloatArray) -> Mask:
     """Whether each vertex of a closed walk is followed by one that comes after it in the sweep."""
     (u, v), (next_u, next_v) = vertices.T, np.roll(vertices, -1, axis=0).T
-    rising: npt.NDArray[np.bool_] = (u < next_u) | ((u == next_u) & (v < next_v))
+    rising: Mask = (u < next_u) | ((u == next_u) & (v < next_v))
     return rising
 
 
-def _turns(walk: FloatArray, corners: npt.NDArray[np.intp]) -> FloatArray:
+def _turns(walk: FloatArray, corners: Indices) -> FloatArray:
     """Turn of a walk at some of its vertices: positive to the left, and of the exact sign."""
     corner = walk[corners]
     behind, ahead = walk[corners - 1], walk[(corners + 1) % len(walk)]

@@ -7,11 +7,9 @@ from shapely import LineString, Point
 
 from oxbow.contracts import PathRequest
 from oxbow.errors import Internal
+from oxbow.tolerances import ROUNDING_M
 
 __all__ = ["require_conforming"]
-
-ROUNDING_M = 1e-6
-"""Turning into the sweep frame and back moves points by far less."""
 
 
 def require_conforming(path: LineString, request: PathRequest) -> None:

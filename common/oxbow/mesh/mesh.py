@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from scipy.sparse import csr_array
 from shapely import Polygon
 
-from oxbow.arrays import Indices
+from oxbow.arrays import Geometries, Indices, Mask
 from oxbow.contracts import FloatArray
 from oxbow.mesh.triangulation import Triangulation
 from oxbow.triangles import angles_rad, doubled_areas, side_lengths
@@ -118,7 +117,7 @@ class Mesh:
         )
 
     @cached_property
-    def polygons(self) -> npt.NDArray[np.object_]:
+    def polygons(self) -> Geometries:
         """Every triangle as a shapely polygon, shape (m,)."""
         return np.asarray(shapely.polygons(self.corners), dtype=object)
 
@@ -146,7 +145,7 @@ class Mesh:
         _, triangle = tree.query_nearest(shapely.points(np.atleast_2d(places)), all_matches=False)
         return np.asarray(triangle)
 
-    def region(self, which: npt.NDArray[np.bool_]) -> Polygon:
+    def region(self, which: Mask) -> Polygon:
         """The union of some triangles that hang together by edges: exact, as no edge is computed anew."""
         merged = shapely.coverage_union_all(self.polygons[which])
         assert isinstance(merged, Polygon), "these triangles do not hang together"

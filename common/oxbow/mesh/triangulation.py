@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely import Polygon
 
-from oxbow.arrays import Indices
+from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray
+from oxbow.tolerances import ROUNDING
 from oxbow.triangles import apexes, cross, doubled_areas, flipped, following, side_lengths, triangulated, twins_of
 
 __all__ = ["Triangulation"]
@@ -21,9 +21,6 @@ FLIP_TOLERANCE = 1e-10
 
 MAX_FLIPS = 200
 """Rounds of flips: rounding could let a few sides flip to and fro for ever."""
-
-ROUNDING = 2.0**-48
-"""Triangles smaller than this share of the squared extent are flat, but for rounding."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +62,7 @@ class Triangulation:
         return np.asarray(self.doubled_areas / (middle * longest))
 
     @cached_property
-    def border_points(self) -> npt.NDArray[np.bool_]:
+    def border_points(self) -> Mask:
         """Which points lie on the border of the area, shape (n,)."""
         on_border = np.zeros(len(self.points), dtype=bool)
         on_border[self.triangles.ravel()[self.twins < 0]] = True

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from oxbow.arrays import Indices
+from oxbow.arrays import Indices, Mask
 from oxbow.mesh.mesh import Mesh
 
 __all__ = ["Wavefront", "propagate"]
@@ -35,9 +34,7 @@ class Wavefront:
     branch: Indices
 
 
-def propagate(
-    mesh: Mesh, starts: Sequence[int] | Indices, within: npt.NDArray[np.bool_] | None = None
-) -> Wavefront:
+def propagate(mesh: Mesh, starts: Sequence[int] | Indices, within: Mask | None = None) -> Wavefront:
     """Let antagonising wavefronts run from some triangles (Balampanis, Maza and Ollero 2016, Algorithm 1).
 
     In every step each wave takes the free neighbours of what it took in the step before; where two waves reach a

@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely import STRtree
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Mask
 from oxbow.contracts import DangerZone, FloatArray, Per
 from oxbow.errors import InvalidMission
 
@@ -108,5 +108,5 @@ class Danger:
 NO_DANGER = Danger()
 
 
-def _is_inside(core: BaseGeometry, places: FloatArray) -> npt.NDArray[np.bool_]:
+def _is_inside(core: BaseGeometry, places: FloatArray) -> Mask:
     return np.asarray(shapely.contains_xy(core, places))

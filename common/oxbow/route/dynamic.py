@@ -16,14 +16,15 @@ import numpy.typing as npt
 import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 
-from oxbow.arrays import Geometries
+from oxbow.arrays import Geometries, Mask
 from oxbow.contracts import FloatArray
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.route.danger import NO_DANGER, Danger
-from oxbow.route.mesh import ROUNDING_M, Mesh
+from oxbow.route.mesh import Mesh
 from oxbow.route.methods import router_on
 from oxbow.route.retriangulation import GRID_M, retriangulated
 from oxbow.route.route import Route, RouteMethod, Router
+from oxbow.tolerances import ROUNDING_M
 
 __all__ = ["DynamicRouter"]
 
@@ -135,7 +136,7 @@ class _Site:
         outlines = [self.obstacles[number].boundary for number in np.unique(near)]
         return np.concatenate([self.open_water.shores_near(areas), outlines])
 
-    def is_water(self, places: FloatArray) -> npt.NDArray[np.bool_]:
+    def is_water(self, places: FloatArray) -> Mask:
         """Whether places, shape (n, 2), are in the open water and in no obstacle."""
         wet = np.zeros(len(places), dtype=np.bool_)
         wet[self.open_water.holding(places).place] = True

@@ -8,22 +8,19 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from shapely import LineString, MultiPolygon, Point, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.arrays import Geometries, Indices
+from oxbow.arrays import Geometries, Indices, Mask
 from oxbow.contracts import FloatArray
 from oxbow.errors import Infeasible, InvalidMission
+from oxbow.tolerances import ROUNDING_M
 from oxbow.triangles import angles_rad, following, triangulated, twins_of
 
-__all__ = ["ROUNDING_M", "Mesh", "Touches"]
-
-ROUNDING_M = 1e-6
-"""A place this near to the water is in it."""
+__all__ = ["Mesh", "Touches"]
 
 TOUCH_M = 1e-9
 """A place this near to a triangle touches it."""
@@ -167,7 +164,7 @@ class Mesh:
         _, distance_m = self._shore_index.query_nearest(line, return_distance=True, all_matches=False)
         return float(distance_m[0])
 
-    def is_clear(self, starts: FloatArray, ends: FloatArray) -> npt.NDArray[np.bool_]:
+    def is_clear(self, starts: FloatArray, ends: FloatArray) -> Mask:
         """Whether straight lines between places, both of shape (n, 2), meet no shore; shape (n,)."""
         lines = np.asarray(shapely.linestrings(np.stack([starts, ends], axis=1)))
         clear = np.ones(len(lines), dtype=np.bool_)

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely import STRtree
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.arrays import Geometries, Indices
+from oxbow.arrays import Geometries, Indices, Mask
 from oxbow.contracts import FloatArray
-from oxbow.route.mesh import ROUNDING_M, Mesh
+from oxbow.route.mesh import Mesh
+from oxbow.tolerances import ROUNDING_M
 from oxbow.triangles import following, paired, triangulated, twins_of
 
 __all__ = ["GRID_M", "Site", "retriangulated"]
@@ -38,7 +38,7 @@ class Site(Protocol):
     def shores_near(self, areas: Geometries) -> Geometries:
         """All lines along which water may end that come within rounding of areas; some may run over land."""
 
-    def is_water(self, places: FloatArray) -> npt.NDArray[np.bool_]:
+    def is_water(self, places: FloatArray) -> Mask:
         """Whether places, shape (n, 2), are in the water."""
 
 

@@ -23,10 +23,11 @@ from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow.errors import InvalidMission
 from oxbow.route.danger import NO_DANGER, Danger
-from oxbow.route.mesh import ROUNDING_M, Mesh, Touches
+from oxbow.route.mesh import Mesh, Touches
 from oxbow.route.network import Ends, Links, Way
 from oxbow.route.search import Arcs, cheapest_ways
 from oxbow.route.sights import sights
+from oxbow.tolerances import ROUNDING_M
 from oxbow.triangles import following
 
 __all__ = ["RINGS", "Tessellation", "lattice"]

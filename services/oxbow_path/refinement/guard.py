@@ -9,13 +9,12 @@ import shapely
 from shapely import Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray
-from oxbow_path.refinement.polyline import BoolArray, Indices, Polyline
+from oxbow.tolerances import ROUNDING_M
+from oxbow_path.refinement.polyline import Polyline
 
 __all__ = ["Guard"]
-
-ROUNDING_M = 1e-6
-"""How far the free space may be left: what rounding moves."""
 
 CLEARANCE = 0.02
 """Least distance between stretches of the path that are no neighbours, in spacings, unless they began nearer."""
@@ -57,9 +56,7 @@ class Guard:
         near_m = shapely.distance(segments[first], segments[second])
         return cls(grown, min([CLEARANCE * spacing_m, *(near_m / 2)]))
 
-    def faults(
-        self, path: Polyline, suspect: BoolArray | None = None, excused: BoolArray | None = None
-    ) -> BoolArray:
+    def faults(self, path: Polyline, suspect: Mask | None = None, excused: Mask | None = None) -> Mask:
         """Which segments (n - 1,) leave the free space, or meet, fold onto or come too near another.
 
         Where only some segments are suspect, the others are known to be at fault with none but those. Excused ones
@@ -91,10 +88,10 @@ class Guard:
             moved = self._moved(path, target, self.faults(path))
         return path if moved is None else moved
 
-    def _moved(self, path: Polyline, target: FloatArray, excused: BoolArray | None) -> Polyline | None:
+    def _moved(self, path: Polyline, target: FloatArray, excused: Mask | None) -> Polyline | None:
         step = np.where(path.pinned[:, None], 0.0, target - path.nodes)
         share = np.ones(len(path.nodes))
-        suspect: BoolArray | None = None
+        suspect: Mask | None = None
         for turn in range(ROUNDS):
             moved = path.moved(path.nodes + share[:, None] * step)
             fault = self.faults(moved, suspect, excused)
@@ -108,9 +105,9 @@ class Guard:
             suspect = blamed[:-1] | blamed[1:]
         return None
 
-    def thinned(self, path: Polyline, drop: BoolArray) -> Polyline:
+    def thinned(self, path: Polyline, drop: Mask) -> Polyline:
         """The path without the nodes to drop, but for those whose loss would put it at fault."""
-        before: BoolArray | None = None
+        before: Mask | None = None
         while drop.any():
             kept = np.flatnonzero(~drop)
             merged = np.diff(kept) > 1
@@ -144,12 +141,12 @@ def _beyond(path: Polyline, pairs: Indices, steps: int) -> Indices:
     return np.asarray(pairs[:, _steps_between(path, pairs) > steps])
 
 
-def _ends(segment: BoolArray) -> BoolArray:
+def _ends(segment: Mask) -> Mask:
     """The nodes (n,) of the chosen segments (n - 1,)."""
     return np.asarray(np.append(segment, False) | np.append(False, segment))
 
 
-def _folded(path: Polyline, cosine: float) -> BoolArray:
+def _folded(path: Polyline, cosine: float) -> Mask:
     """At which inner nodes (n - 2,) the turn's cosine is less."""
     edge = np.diff(path.nodes, axis=0)
     product = path.lengths_m[:-1] * path.lengths_m[1:]

@@ -6,17 +6,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely import LineString
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Geometries, Indices, Mask
 from oxbow.contracts import FloatArray
 
-__all__ = ["BoolArray", "Indices", "Polyline"]
-
-BoolArray = npt.NDArray[np.bool_]
-Indices = npt.NDArray[np.intp]
+__all__ = ["Polyline"]
 
 
 @dataclass(frozen=True)
@@ -36,12 +33,12 @@ class Polyline:
     """
 
     nodes: FloatArray
-    pinned: BoolArray
-    legs: BoolArray
-    rigid: BoolArray
+    pinned: Mask
+    legs: Mask
+    rigid: Mask
 
     @classmethod
-    def of(cls, path: LineString, free: BaseGeometry, rigid: BoolArray | None = None) -> Polyline:
+    def of(cls, path: LineString, free: BaseGeometry, rigid: Mask | None = None) -> Polyline:
         """A path's own vertices as nodes; `free` is the (prepared) free space."""
         nodes = shapely.get_coordinates(path)
         legs = ~shapely.covers(free, _segments(nodes))
@@ -72,7 +69,7 @@ class Polyline:
         return LineString(self.nodes)
 
     @cached_property
-    def segments(self) -> npt.NDArray[np.object_]:
+    def segments(self) -> Geometries:
         """Each segment as a line, shape (n - 1,)."""
         return _segments(self.nodes)
 
@@ -102,12 +99,12 @@ class Polyline:
             self.rigid[segment],
         )
 
-    def without(self, drop: BoolArray) -> Polyline:
+    def without(self, drop: Mask) -> Polyline:
         """Without some nodes, none of them pinned or an end of a rigid segment."""
         kept = np.flatnonzero(~drop)
         return Polyline(self.nodes[kept], self.pinned[kept], self.legs[kept[:-1]], self.rigid[kept[:-1]])
 
-    def crowded(self, least_m: float) -> BoolArray:
+    def crowded(self, least_m: float) -> Mask:
         """Nodes (n,) that could go: the segments on their two sides together are shorter than `least_m`.
 
         No two neighbours are among them.
@@ -119,5 +116,5 @@ class Polyline:
         return np.asarray(crowded & (run % 2 == 1))
 
 
-def _segments(nodes: FloatArray) -> npt.NDArray[np.object_]:
+def _segments(nodes: FloatArray) -> Geometries:
     return np.asarray(shapely.linestrings(np.stack([nodes[:-1], nodes[1:]], axis=1)))

@@ -12,13 +12,13 @@ construction.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Geometries, Mask
 from oxbow.contracts import FloatArray
-from oxbow_path.walk.legs import ROUNDING_M
+from oxbow.tolerances import ROUNDING_M
 from oxbow_path.walk.region import largest
 
 __all__ = ["enclosed"]
@@ -70,7 +70,7 @@ def _moats(region: Polygon, free: Polygon, width_m: float) -> BaseGeometry:
     return shapely.union_all([water, *touching])
 
 
-def _slit(region: Polygon, slits: npt.NDArray[np.object_]) -> Polygon:
+def _slit(region: Polygon, slits: Geometries) -> Polygon:
     """The region less all slits that do not part it."""
     for slit in slits:
         rest = region.difference(slit)
@@ -79,7 +79,7 @@ def _slit(region: Polygon, slits: npt.NDArray[np.object_]) -> Polygon:
     return region
 
 
-def _is_odd(faces: npt.NDArray[np.object_], way: FloatArray) -> npt.NDArray[np.bool_]:
+def _is_odd(faces: Geometries, way: FloatArray) -> Mask:
     """Whether a line from a face to infinity crosses the way an odd number of times."""
     inner = shapely.get_coordinates(shapely.point_on_surface(faces))
     x, y = inner[:, None, 0], inner[:, None, 1]
@@ -90,7 +90,7 @@ def _is_odd(faces: npt.NDArray[np.object_], way: FloatArray) -> npt.NDArray[np.b
     return np.asarray((spans & right).sum(axis=1) % 2 == 1)
 
 
-def _meetings(stretches: npt.NDArray[np.object_]) -> npt.NDArray[np.object_]:
+def _meetings(stretches: Geometries) -> Geometries:
     """The places at which a tour meets itself."""
     ends = np.vstack([shapely.get_point(stretches, k) for k in (0, -1)]).ravel()
     places, count = np.unique(shapely.get_coordinates(ends), axis=0, return_counts=True)

@@ -14,6 +14,7 @@ from shapely import LineString, Polygon
 from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow.errors import Infeasible
+from oxbow.tolerances import ROUNDING_M
 from oxbow_path.task import Task
 from oxbow_path.tour.geodesic import Geodesics, Shore
 from oxbow_path.tour.local_search import shortened
@@ -24,7 +25,6 @@ from oxbow_path.tour.sites import clustered, low_discrepancy, with_gaps
 from oxbow_path.tour.solver import Solution, Solver
 from oxbow_path.tour.start import first_tour
 from oxbow_path.walk.gaps import branch_to
-from oxbow_path.walk.legs import ROUNDING_M
 from oxbow_path.walk.region import Brush, Circuit, Walk, clear_of_land, simply_connected
 from oxbow_path.walk.remainder import with_remainder
 from oxbow_path.walk.spacing import Budget

@@ -20,13 +20,11 @@ from shapely.ops import substring
 
 from oxbow.contracts import FloatArray, Place
 from oxbow.errors import Infeasible, Internal
+from oxbow.tolerances import ROUNDING_M
 from oxbow_path.walk.region import largest
 from oxbow_path.walk.routes import Routes, taut
 
-__all__ = ["ROUNDING_M", "Access", "Passable", "access", "is_plainly_simple", "joined"]
-
-ROUNDING_M = 1e-6
-"""Places nearer to each other than this are one."""
+__all__ = ["Access", "Passable", "access", "is_plainly_simple", "joined"]
 
 OPENING = 0.1
 """Width of the ring's opening at most, as a share of the shorter leg."""

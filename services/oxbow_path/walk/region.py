@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely import LinearRing, LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Mask
 from oxbow.contracts import FloatArray
 from oxbow_path.walk.probe import Probe, covered
 
@@ -149,7 +149,7 @@ def _enclose(region: Polygon, probe: Probe, reach_m: float) -> tuple[list[Linear
     )
 
 
-def _near(points: FloatArray, area: Polygon, margin_m: float) -> npt.NDArray[np.bool_]:
+def _near(points: FloatArray, area: Polygon, margin_m: float) -> Mask:
     """Which points lie in the bounding box of an area, widened by a margin."""
     x0, y0, x1, y1 = area.bounds
     low, high = np.array([x0, y0]) - margin_m, np.array([x1, y1]) + margin_m

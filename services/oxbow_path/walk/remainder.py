@@ -12,8 +12,8 @@ from shapely import LineString, Point
 from shapely.ops import substring
 
 from oxbow.contracts import FloatArray
+from oxbow.tolerances import ROUNDING_M
 from oxbow_path.walk.gaps import branch_to
-from oxbow_path.walk.legs import ROUNDING_M
 from oxbow_path.walk.region import Brush, Walk, largest, simply_connected
 from oxbow_path.walk.spacing import Budget
 from oxbow_path.walk.trial import Trial, Waters, finished, touches_entries
