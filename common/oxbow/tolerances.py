@@ -5,8 +5,8 @@ from __future__ import annotations
 __all__ = ["ROUNDING", "ROUNDING_M"]
 
 ROUNDING_M = 1e-6
-"""Places nearer to each other than this are one, and one this near to an area is in it: where places are projected,
-turned or cut out of lines, rounding moves them by far less."""
+"""Places nearer to each other than this are one, and one this near to an area is in it: to project, turn and
+intersect moves places by far less."""
 
 ROUNDING = 2.0**-48
 """How exact coordinates are, as a share of the greatest one: a few units in the last place."""

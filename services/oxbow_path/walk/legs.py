@@ -3,6 +3,9 @@
 Equal points give one closed ring: out at one place, back in beside it. Points apart give an open path that still
 travels the whole ring: round one side of the region from launch to recovery, back through its middle, and
 round the other side. (The report, Rendas and Li 2016, section 1.2.1.2, treats only equal points.)
+
+`oxbow.approach` makes legs of another kind, from gate to gate: both ways run beside a middle line, in water wide
+enough for them. Here a leg ends on the ring, and the way back opens from nothing, however narrow the water.
 """
 
 from __future__ import annotations

@@ -103,6 +103,7 @@ def taut(route: LineString, water: BaseGeometry) -> LineString:
     """A route pulled tight: from each vertex straight on to the farthest one that the water lets see.
 
     Backward and forward, over points spread along the route, so that bends shrink to the corners of the shore.
+    Unlike a shortest route through that water, it may begin outside, and stays as it is where the water ends.
     """
     for _ in range(2):
         points = shapely.get_coordinates(shapely.segmentize(route, route.length / TAUT_POINTS))[::-1]
