@@ -61,7 +61,7 @@ def completed(
         certificate=_in_degrees(teams[0].certificate, site.frame),
         warnings=site.warnings
         + space.warnings
-        + tuple(text for team in teams for text in team.warnings + _near_legs(mission, team)),
+        + tuple(text for team in teams for text in _team_warnings(mission, options, team)),
         dropped=tuple(
             _dropped(part, site.frame) for part in space.dropped + tuple(p for team in teams for p in team.dropped)
         ),
@@ -137,10 +137,18 @@ def _fleet(teams: Sequence[TeamPlan], written: Sequence[Sequence[_Written]]) -> 
     )
 
 
+def _team_warnings(mission: Mission, options: PlanOptions, team: TeamPlan) -> tuple[str, ...]:
+    if not any(plan.hot_spots for plan in team.vehicles):
+        return team.warnings + _near_legs(mission, team)
+    if options.smooth:
+        return (*team.warnings, "passes over hot spots keep their corners: only surveys are smoothed")
+    return team.warnings
+
+
 def _near_legs(mission: Mission, team: TeamPlan) -> tuple[str, ...]:
     """Whether the legs of a survey come nearer to one another than the mission wants: water comes before rate."""
     wanted_m, least_m = mission.minimal_spatial_rate_m, team.certificate.least_leg_distance_m
-    if wanted_m is None or least_m is None or least_m >= wanted_m or any(plan.hot_spots for plan in team.vehicles):
+    if wanted_m is None or least_m is None or least_m >= wanted_m:
         return ()
     return (
         f"legs come as near as {least_m:.3g} m to one another, in narrow water or beside a bend;"

@@ -7,6 +7,8 @@ be accepted, and `where`: the field, vertex or stage it came from.
 from __future__ import annotations
 
 import enum
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import ClassVar
 
 import msgspec
@@ -21,6 +23,7 @@ __all__ = [
     "InvalidMission",
     "OxbowError",
     "Unavailable",
+    "renamed",
 ]
 
 
@@ -47,6 +50,15 @@ class OxbowError(Exception):
 
     def __str__(self) -> str:
         return f"{self.where}: {self.message}" if self.where else self.message
+
+
+@contextmanager
+def renamed(fields: Mapping[str, str]) -> Iterator[None]:
+    """Say of errors which field they are about by the name that it has for whoever gave it."""
+    try:
+        yield
+    except OxbowError as error:
+        raise type(error)(error.message, fields.get(error.where, error.where)) from error
 
 
 class InvalidMission(OxbowError):

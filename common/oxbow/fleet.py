@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
 from shapely import LineString
@@ -16,7 +16,7 @@ from oxbow.contracts import (
     Role,
     Vehicle,
 )
-from oxbow.errors import OxbowError
+from oxbow.errors import renamed
 from oxbow.frame import Position
 from oxbow.mission import Mission
 from oxbow.vehicles import GivenVehicle
@@ -55,13 +55,9 @@ class Member:
         """A warning, and which vehicle it is about."""
         return f"{self.vehicle.name}: {warning}" if self.is_named else warning
 
-    @contextmanager
-    def named(self) -> Iterator[None]:
+    def named(self) -> AbstractContextManager[None]:
         """Say of errors which field of the Mission File they are about, and which vehicle it is."""
-        try:
-            yield
-        except OxbowError as error:
-            raise type(error)(error.message, self.fields.get(error.where, error.where)) from error
+        return renamed(self.fields)
 
 
 @dataclass(frozen=True)

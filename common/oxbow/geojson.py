@@ -17,9 +17,10 @@ from oxbow.mission import Bloom, Mission, MissionType
 from oxbow.site import Site
 from oxbow.strict_json import decode_json
 
-__all__ = ["mission_from_geojson"]
+__all__ = ["DOCUMENT", "mission_from_geojson"]
 
 DOCUMENT = "GeoJSON"
+"""What errors call the document as a whole."""
 
 
 class _AreaKind(enum.StrEnum):
@@ -120,7 +121,7 @@ def _areas(data: bytes) -> list[_Area]:
     """Every polygon of the document."""
     if len(data) > MAX_REQUEST_BYTES:
         raise InvalidMission(f"is {len(data)} bytes; expected at most {MAX_REQUEST_BYTES}", where=DOCUMENT)
-    head = decode_json(data, _Head, DOCUMENT)
+    head = decode_json(data, _Head, DOCUMENT, at=DOCUMENT)
     require_wgs84(head.crs)
     match head.type:
         case _Kind.FEATURE_COLLECTION:

@@ -32,7 +32,7 @@ from oxbow.contracts import (
     Role,
     Track,
 )
-from oxbow.errors import Infeasible
+from oxbow.errors import Infeasible, renamed
 from oxbow.fleet import Member, TeamPlan, VehiclePlan
 from oxbow.mission import Mission, PlanOptions
 from oxbow.site import Site
@@ -127,18 +127,17 @@ def survey(task: Task, team: Sequence[Member]) -> TeamPlan:
 def treatment(task: Task) -> TeamPlan:
     """Treat the hot spots: a sortie for each slave, as far as its length goes."""
     team = {member.vehicle.name: member for member in task.site.team(Role.SLAVE)}
-    assignment = task.call(
-        ASSIGN,
-        AssignRequest(
-            free=task.space.free,
-            vehicles=tuple(member.vehicle for member in team.values()),
-            hot_spots=task.site.hot_spots,
-            swath_m=task.mission.treated_swath_m,
-            danger_zones=task.site.danger_zones,
-            danger_detour_m=task.site.danger_detour_m,
-            seed=task.options.seed,
-        ),
+    request = AssignRequest(
+        free=task.space.free,
+        vehicles=tuple(member.vehicle for member in team.values()),
+        hot_spots=task.site.hot_spots,
+        swath_m=task.mission.treated_swath_m,
+        danger_zones=task.site.danger_zones,
+        danger_detour_m=task.site.danger_detour_m,
+        seed=task.options.seed,
     )
+    with renamed({"swath_m": "Swath" if task.mission.swath_m else "Minimal_spatial_rate"}):
+        assignment = task.call(ASSIGN, request)
     if not assignment.sorties:
         reasons = "; ".join(f"{left.hot_spot}: {left.reason}" for left in assignment.left)
         raise Infeasible(f"has no hot spot that can be treated ({reasons})", where="PriorModel")

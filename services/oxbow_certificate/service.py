@@ -40,14 +40,15 @@ def handle(request: CertifyRequest, show: Show) -> Certificate:
 
 
 def _gaps(judgement: Judgement) -> Layer:
-    """Sampled places that lie far from every path, coloured by their distance as a share of the largest."""
+    """Sampled places that lie far from every path, coloured by how far between what is far and the largest."""
     spread = judgement.spread
-    far = spread.distance_m > GAP_RATIO * judgement.certificate.least_radius_m
+    far_m = GAP_RATIO * judgement.certificate.least_radius_m
+    far = spread.distance_m > far_m
     return Layer(
         stage=STAGE,
         name="gaps",
         geometries=tuple(Point(place) for place in spread.places[far]),
-        values=tuple((spread.distance_m[far] / judgement.cover.high_m).tolist()),
+        values=tuple(((spread.distance_m[far] - far_m) / (judgement.cover.high_m - far_m)).tolist()),
     )
 
 

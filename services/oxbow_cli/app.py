@@ -266,21 +266,23 @@ def import_site(
     Example: `oxbow import site.geojson --launch 44.6035,-73.3912 --safety 10 -o lake.json`
     """
     from oxbow.contracts import MAX_REQUEST_BYTES
+    from oxbow.errors import renamed
     from oxbow.files import read_bytes
-    from oxbow.geojson import mission_from_geojson
+    from oxbow.geojson import DOCUMENT, mission_from_geojson
     from oxbow.mission import mission_json
     from oxbow_cli.arguments import position, save
 
-    mission = mission_from_geojson(
-        read_bytes(site, MAX_REQUEST_BYTES),
-        launch=position(launch, "--launch"),
-        recovery=None if recovery is None else position(recovery, "--recovery"),
-        site_name=name,
-        safety_m=safety,
-        length_m=length,
-        minimal_spatial_rate_m=spacing,
-        part=part,
-    )
+    with renamed({DOCUMENT: str(site), f"{DOCUMENT}.type": f"{site}: type"}):
+        mission = mission_from_geojson(
+            read_bytes(site, MAX_REQUEST_BYTES),
+            launch=position(launch, "--launch"),
+            recovery=None if recovery is None else position(recovery, "--recovery"),
+            site_name=name,
+            safety_m=safety,
+            length_m=length,
+            minimal_spatial_rate_m=spacing,
+            part=part,
+        )
     if output is None:
         print(mission_json(mission).decode(), end="")
     else:

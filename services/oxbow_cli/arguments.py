@@ -15,7 +15,7 @@ import msgspec
 
 from oxbow.bus import DEFAULT_ENDPOINT
 from oxbow.contracts import Draw, Method
-from oxbow.errors import InvalidMission, OxbowError
+from oxbow.errors import InvalidMission, OxbowError, renamed
 from oxbow.frame import Position
 from oxbow.mission import Mission, read_mission, write_mission
 from oxbow.plan import PlanOptions
@@ -116,11 +116,8 @@ def require_compatible(
 
 def read(path: Path) -> Mission:
     """The mission in a file; an error about the file as a whole has its name."""
-    try:
+    with renamed({"Mission File": str(path)}):
         return read_mission(path)
-    except InvalidMission as error:
-        where = str(path) if error.where == "Mission File" else error.where
-        raise InvalidMission(error.message, where) from error
 
 
 @contextmanager

@@ -178,6 +178,12 @@ def test_nothing_that_can_be_treated_is_infeasible():
         plan_mission(mission("treat", Slave_length=60.0), OPTIONS, call=local_call())
 
 
+@pytest.mark.parametrize("smooth", [False, True])
+def test_that_a_treatment_is_not_smoothed_is_told(smooth):
+    plan = planned(mission("treat"), PlanOptions(smooth=smooth))[0].plan
+    assert any("keep their corners" in text for text in plan.warnings) is smooth
+
+
 @pytest.mark.parametrize("kind", ["map&treat", "adap&treat"])
 def test_master_surveys_and_slave_treats(kind):
     completed, calls = planned(mission(kind))
