@@ -232,9 +232,9 @@ def test_the_stages_get_what_they_need_of_it():
     asked = {}
     call = local_call()
 
-    def noting(endpoint, request):
+    def noting(endpoint, request, *, part):
         asked[endpoint.stage] = decode(encode(request), endpoint.request)
-        return call(endpoint, request)
+        return call(endpoint, request, part=part)
 
     known = mission(collection(feature(NEAR, weight=2), variogram=CLAY))
     plan_mission(known, PlanOptions(time_limit_s=20.0), call=noting)
