@@ -232,7 +232,7 @@ def test_the_stages_get_what_they_need_of_it():
     asked = {}
     call = local_call()
 
-    def noting(endpoint, request, *, part):
+    def noting(endpoint, request, *, part=""):
         asked[endpoint.stage] = decode(encode(request), endpoint.request)
         return call(endpoint, request, part=part)
 
