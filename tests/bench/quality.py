@@ -11,7 +11,7 @@ from bounded import Bounded
 from results import Figure, Goal, Section, middle
 from stages import TimedCall
 
-from oxbow.contracts import CERTIFY, CONTOUR, DECOMPOSE, PATH, Method
+from oxbow.contracts import CERTIFY, CONTOUR, DECOMPOSE, PATH, Method, Role
 from oxbow.errors import OxbowError
 from oxbow.mission import PlanOptions, read_mission
 from oxbow.pipeline import plan_mission
@@ -75,7 +75,13 @@ def measure() -> Iterator[Section]:
 
 
 def _rows(bounded: Bounded, folder: Path, method: Method) -> list[dict[str, Figure]]:
-    return [_row(bounded, file, method) for file in sorted(folder.glob("*.json"))]
+    files = sorted(folder.glob("*.json"))
+    return [_row(bounded, file, method) for file in files if _is_survey(file)]
+
+
+def _is_survey(file: Path) -> bool:
+    """Whether a mission is to cover all of the water: of passes over hot spots alone, q would tell nothing."""
+    return Role.MASTER in read_mission(file).mission_type.roles
 
 
 def _row(bounded: Bounded, file: Path, method: Method) -> dict[str, Figure]:
