@@ -4,6 +4,9 @@ import json
 
 import pytest
 
+QUICK = ("--method", "Transect")
+"""Where the method does not matter."""
+
 
 def test_completes_the_file_and_keeps_what_it_does_not_know(oxbow, folder):
     result = oxbow("plan", "pond.json", "--local")
@@ -16,18 +19,21 @@ def test_completes_the_file_and_keeps_what_it_does_not_know(oxbow, folder):
 
 
 def test_only_transects_have_a_heading(oxbow):
-    assert "heading" not in oxbow("plan", "pond.json", "--local", "-o", "curve.json").stdout
+    assert "heading" not in oxbow("plan", "pond.json", "--local", "--time-limit", 0.1).stdout
     assert "heading" in oxbow("plan", "pond.json", "--local", "-o", "legs.json", "--method", "Transect").stdout
 
 
 def test_a_name_is_plain_text(oxbow, folder, pond):
     (folder / "pond.json").write_text(json.dumps(pond(SiteName="Pond [red] :fish: [/]")))
-    assert "Plan of Pond [red] :fish: [/]" in oxbow("plan", "pond.json", "--local").stdout
+    told = oxbow("plan", "pond.json", "--local", *QUICK).stdout
+    assert "Plan of Pond [red] :fish: [/]" in told
 
 
 def test_writes_elsewhere_when_asked(oxbow, folder):
     before = (folder / "pond.json").read_bytes()
-    result = oxbow("plan", "pond.json", "--local", "-o", "planned.json", "--json", "--heading", 30, "--seed", 7)
+    result = oxbow(
+        "plan", "pond.json", "--local", "-o", "planned.json", "--json", "--seed", 7, "--heading", 30, *QUICK
+    )
     assert result.returncode == 0, result.stderr
     assert (folder / "pond.json").read_bytes() == before
     printed = json.loads(result.stdout)

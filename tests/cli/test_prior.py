@@ -27,7 +27,7 @@ def prior(folder):
 
 
 def planned(oxbow, folder, *options):
-    result = oxbow("plan", "pond.json", "-o", "planned.json", *options)
+    result = oxbow("plan", "pond.json", "-o", "planned.json", "--method", "Transect", *options)
     assert result.returncode == 0, result.stderr
     return json.loads((folder / "planned.json").read_text())
 

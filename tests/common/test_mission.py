@@ -13,10 +13,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from oxbow.contracts import MAX_REQUEST_BYTES
+from oxbow.contracts import MAX_REQUEST_BYTES, Method
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.mission import Mission, mission_json, parse_mission, read_mission, write_mission
 from oxbow.pipeline import plan_mission
+from oxbow.plan import PlanOptions
 from oxbow.site import Site
 from oxbow_cli.local import local_call
 
@@ -285,7 +286,7 @@ SCHEMA = json.loads((Path(__file__).parents[2] / "docs/mission-file.schema.json"
 def test_examples_and_their_plans_follow_the_schema(path):
     validator = jsonschema.Draft202012Validator(SCHEMA)
     validator.validate(json.loads(path.read_text()))
-    completed = plan_mission(read_mission(path), call=local_call())
+    completed = plan_mission(read_mission(path), PlanOptions(method=Method.TRANSECT), call=local_call())
     validator.validate(json.loads(mission_json(completed)))
 
 
