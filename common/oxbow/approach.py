@@ -21,7 +21,7 @@ from shapely.ops import substring
 
 from oxbow.contracts import FloatArray, FreeSpace, Place, Vehicle
 from oxbow.errors import Infeasible
-from oxbow.route import RouteMethod, Router, make_router
+from oxbow.route import RouteMethod, Router, make_router, way_to
 from oxbow.tolerances import ROUNDING_M
 
 __all__ = ["Approach", "Harbour"]
@@ -56,7 +56,7 @@ class Approach:
     apart_m
         How far legs may run beside their middle lines.
     water
-        What legs keep to.
+        What legs keep to: the free space, and what lies between it and the vehicle's own places.
     """
 
     space: FreeSpace
@@ -65,7 +65,7 @@ class Approach:
     out: FloatArray | None = None
     home: FloatArray | None = None
     apart_m: float = 0.0
-    water: Polygon = field(default_factory=Polygon)
+    water: BaseGeometry = field(default_factory=Polygon)
 
     def length_m(self, range_m: float) -> float:
         """What the legs leave of a range for the share.
@@ -127,11 +127,7 @@ class Approach:
                 yield _Candidate(out, way, home)
 
     def _keeps_to_water(self, leg: LineString) -> bool:
-        """Whether a leg leaves the water at most near the straight stretches to the vehicle's own places."""
-        legs = (self.out, None if self.home is None else self.home[::-1])
-        ends = [LineString(leg[:2]) for leg in legs if leg is not None]
-        allowed = shapely.union_all([self.water, *(end.buffer(self.apart_m) for end in ends)])
-        return bool(leg.difference(allowed.buffer(OFF_M)).length == 0.0)
+        return bool(leg.difference(self.water.buffer(OFF_M)).length == 0.0)
 
 
 @dataclass(frozen=True)
@@ -167,7 +163,7 @@ class Harbour:
 
     def __init__(self, space: FreeSpace, spacing_m: float) -> None:
         self.space = space
-        self._lanes = [_Lanes(space.free, APART * spacing_m * 0.5**step) for step in range(HALVINGS)]
+        self._lanes = [_Lanes(space, APART * spacing_m * 0.5**step) for step in range(HALVINGS)]
 
     def approach(self, share: Polygon, vehicle: Vehicle) -> Approach:
         """The approach of a vehicle to its share.
@@ -179,6 +175,7 @@ class Harbour:
         """
         start, recovery = vehicle.start, vehicle.recovery
         out_is_remote, home_is_remote = (self._is_remote(share, place) for place in (start, recovery))
+        remote = [start] * out_is_remote + [recovery] * home_is_remote
         if not (out_is_remote or home_is_remote):
             return Approach(structs.replace(self.space, free=share), start, recovery)
         found = self._to_gate(share, start if out_is_remote else recovery)
@@ -194,7 +191,7 @@ class Harbour:
             space=structs.replace(self.space, free=share, water=water),
             launch=gate if out_is_remote else start,
             recovery=gate if home_is_remote else recovery,
-            water=self.space.free,
+            water=shapely.union_all([self.space.free, *map(lanes.beside_entry, remote)]),
             out=way if out_is_remote else None,
             home=home[::-1] if home_is_remote else None,
             apart_m=lanes.apart_m,
@@ -218,39 +215,46 @@ class Harbour:
 class _Lanes:
     """The middle of the free space: far enough from its rim for a leg on either side."""
 
-    free: Polygon
+    space: FreeSpace
     apart_m: float
 
     @cached_property
     def _middle(self) -> BaseGeometry:
-        return self.free.buffer(-2.0 * self.apart_m, quad_segs=2)
+        return self.space.free.buffer(-2.0 * self.apart_m, quad_segs=2)
 
     @cached_property
     def _router(self) -> Router:
-        return make_router(RouteMethod.VISIBILITY, self.free.buffer(-1.5 * self.apart_m, quad_segs=2))
+        return make_router(RouteMethod.VISIBILITY, self.space.free.buffer(-1.5 * self.apart_m, quad_segs=2))
 
     def way(self, place: Place, goal: Place | FloatArray) -> FloatArray:
         """The middle line from a place, ashore or not, to another in the middle of the free space."""
-        return np.vstack([place, self._router.route(self._entry(place), goal).polyline])
+        entry = self._entry(place)
+        return np.vstack([entry[:-1], self._router.route(entry[-1], goal).polyline])
 
     def to_gate(self, share: Polygon, place: Place) -> FloatArray | None:
         """The middle line from a place to the nearest gate of a share; None where no way leads there."""
         gates = _edge_middles(share.intersection(self._middle), GATES)
         if self._middle.is_empty or not len(gates):
             return None
-        distances = self._router.distances(np.vstack([self._entry(place), gates]))[0, 1:]
+        entry = self._entry(place)
+        distances = self._router.distances(np.vstack([entry[-1:], gates]))[0, 1:]
         if not np.isfinite(distances).any():
             return None
-        line = LineString(self.way(place, gates[np.argmin(distances)])[1:])
+        line = LineString(self._router.route(entry[-1], gates[np.argmin(distances)]).polyline)
         # From where it is near, straight on: one side of a leg that met the rim at a slant would lie in the share.
         near = shapely.points(shapely.get_coordinates(line.intersection(share.buffer(2.0 * self.apart_m))))
         far = shapely.get_coordinates(substring(line, 0.0, float(shapely.line_locate_point(line, near).min())))
         gate = shapely.get_coordinates(shapely.shortest_line(share, Point(far[-1])))[0]
-        return np.vstack([place, far, gate])
+        return np.vstack([entry[:-1], far, gate])
+
+    def beside_entry(self, place: Place) -> BaseGeometry:
+        """Where legs may run from a place to the middle of the free space; over land where the place is ashore."""
+        strip = LineString(self._entry(place)).buffer(self.apart_m)
+        return strip & self.space.water if self.space.water.intersects(Point(place).buffer(OFF_M)) else strip
 
     def _entry(self, place: Place) -> FloatArray:
-        """Where the middle of the free space is nearest to a place."""
-        return np.asarray(shapely.get_coordinates(shapely.shortest_line(self._middle, Point(place)))[0])
+        """The way (n, 2) from a place, ashore or not, to the middle of the free space."""
+        return way_to(self._middle, self.space.water, place)
 
 
 @dataclass(frozen=True)

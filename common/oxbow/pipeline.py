@@ -129,6 +129,7 @@ def treatment(task: Task) -> TeamPlan:
     team = {member.vehicle.name: member for member in task.site.team(Role.SLAVE)}
     request = AssignRequest(
         free=task.space.free,
+        water=task.space.water,
         vehicles=tuple(member.vehicle for member in team.values()),
         hot_spots=task.site.hot_spots,
         swath_m=task.mission.treated_swath_m,

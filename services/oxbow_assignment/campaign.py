@@ -22,6 +22,9 @@ __all__ = ["Campaign", "plan_campaign"]
 NOTED = 0.01
 """Share of a hot spot outside the free space that is worth a warning."""
 
+ON_SHORE_M = 1.0
+"""A leg that leaves the water by no more begins on its shore."""
+
 
 @dataclass(frozen=True)
 class Campaign:
@@ -81,6 +84,7 @@ def plan_campaign(
     free: Polygon,
     swath_m: float,
     *,
+    water: Polygon | None = None,
     danger: Danger = NO_DANGER,
     seed: int = 0,
 ) -> Campaign:
@@ -96,6 +100,8 @@ def plan_campaign(
         Where they may go.
     swath_m
         The width that one pass treats.
+    water
+        What legs to and from the free space may cross; absent: the free space alone.
     danger
         What routes to, between and from hot spots avoid; passes over a hot spot do not.
     seed
@@ -110,7 +116,7 @@ def plan_campaign(
     """
     require_treatable(spots)
     shapely.prepare(free)
-    fleet = Fleet.of(slaves, free, danger)
+    fleet = Fleet.of(slaves, free, free if water is None else water, danger)
     found = tuple(waters(spots, free))
     # From pass to pass there is next to nothing to choose: the funnel's way is the shortest, and found at once.
     between_passes = make_router(RouteMethod.FUNNEL, free)
@@ -167,15 +173,19 @@ def _out_of_reach(treatments: Sequence[Treatment], division: Division, fleet: Fl
 
 
 def _leg_warnings(fleet: Fleet) -> Iterator[str]:
+    afloat = fleet.water.buffer(ON_SHORE_M)
     for slave, out, home in zip(fleet.slaves, fleet.out, fleet.home, strict=True):
         legs = {"start": out, "recovery": home}
         if slave.start == slave.recovery:
             legs = {"start and recovery": out}
         for which, leg in legs.items():
-            if leg.length > 0.0:
+            whose = f"{which} of vehicle {slave.name!r}"
+            if not afloat.covers(leg):
+                yield f"{whose}: ashore; the leg of {leg.length:.0f} m is straight, whatever lies there"
+            elif len(leg.coords) > 2:
                 yield (
-                    f"the leg of {leg.length:.0f} m between the free space and {which} of vehicle {slave.name!r}"
-                    " is straight, whatever lies there"
+                    f"{whose}: out of sight of the free space; the leg leads {leg.length:.0f} m through water"
+                    " nearer to the shore than Safety"
                 )
 
 

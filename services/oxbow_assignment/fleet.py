@@ -15,11 +15,11 @@ from functools import cached_property
 import numpy as np
 import shapely
 from msgspec import structs
-from shapely import LineString, Point, Polygon
+from shapely import LineString, Polygon
 
 from oxbow.contracts import FloatArray, Vehicle
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.route import NO_DANGER, Danger, RouteMethod, Router, make_router
+from oxbow.route import NO_DANGER, Danger, RouteMethod, Router, make_router, way_to
 
 __all__ = ["Fleet", "Ways"]
 
@@ -62,6 +62,8 @@ class Fleet:
         At least one.
     free
         Where they may go; prepared.
+    water
+        What their legs may cross.
     danger
         What is to be avoided there.
     routers
@@ -69,12 +71,13 @@ class Fleet:
     router
         Of the ways between treatments, with an `a` of 1: the report sets it between vehicles and targets alone.
     out, home
-        A leg for each slave: from its start straight to the nearest place of the free space, and from there to its
-        recovery; of no length where the point lies in the free space.
+        A leg for each slave: from its start to the free space, and from there to its recovery (`way_to`); of no
+        length where the point lies in the free space.
     """
 
     slaves: tuple[Vehicle, ...]
     free: Polygon
+    water: Polygon
     danger: Danger
     routers: tuple[Router, ...]
     router: Router
@@ -82,7 +85,7 @@ class Fleet:
     home: tuple[LineString, ...]
 
     @classmethod
-    def of(cls, slaves: Sequence[Vehicle], free: Polygon, danger: Danger = NO_DANGER) -> Fleet:
+    def of(cls, slaves: Sequence[Vehicle], free: Polygon, water: Polygon, danger: Danger = NO_DANGER) -> Fleet:
         """The slaves, their legs and their routers.
 
         Raises
@@ -94,8 +97,8 @@ class Fleet:
         """
         if not slaves:
             raise InvalidMission("has no slave; expected one or more to treat the hot spots", where="vehicles")
-        out = tuple(shapely.shortest_line(Point(slave.start), free) for slave in slaves)
-        home = tuple(shapely.shortest_line(free, Point(slave.recovery)) for slave in slaves)
+        out = tuple(LineString(way_to(free, water, slave.start)) for slave in slaves)
+        home = tuple(LineString(way_to(free, water, slave.recovery)[::-1]) for slave in slaves)
         for slave, leg, back in zip(slaves, out, home, strict=True):
             if leg.length + back.length >= slave.length_m:
                 raise Infeasible(
@@ -109,7 +112,7 @@ class Fleet:
             for factor in {1.0, *factors}
         }
         own = tuple(routers[factor] for factor in factors)
-        return cls(tuple(slaves), free, danger, own, routers[1.0], out, home)
+        return cls(tuple(slaves), free, water, danger, own, routers[1.0], out, home)
 
     @cached_property
     def cautious_slaves(self) -> tuple[Vehicle, ...]:

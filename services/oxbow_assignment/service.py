@@ -34,7 +34,13 @@ def handle(request: AssignRequest, show: Show) -> Assignment:
     slaves = _with_role(request.vehicles, Role.SLAVE)
     danger = Danger(request.danger_zones, request.danger_detour_m)
     campaign = plan_campaign(
-        request.hot_spots, slaves, request.free, request.swath_m, danger=danger, seed=request.seed
+        request.hot_spots,
+        slaves,
+        request.free,
+        request.swath_m,
+        water=request.water,
+        danger=danger,
+        seed=request.seed,
     )
     first, *others = campaign.schedule.rounds or ((),)
 

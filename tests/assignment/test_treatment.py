@@ -121,7 +121,7 @@ def test_a_swath_far_too_small_is_refused():
 
 
 def fleet(*slaves, free: Polygon = SEA) -> Fleet:
-    return Fleet.of(slaves, free)
+    return Fleet.of(slaves, free, free)
 
 
 @pytest.mark.parametrize("length_m", [600.0, 1_000.0, 5_000.0])

@@ -250,6 +250,31 @@ def test_progress_never_runs_backwards():
     assert heard[-1][1] < 1.0
 
 
+CREEK = contour(
+    (0, 0), (800, 0), (800, 100), (912, 100), (912, 250), (900, 250), (900, 112), (800, 112), (800, 300), (0, 300)
+)
+"""A lake, and a creek too narrow for `Safety` that leads round a corner."""
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        mission("treat", BoundingBox=CREEK, LaunchPoint=at(906, 245), Safety=7.0),
+        mission("map", boats("master", 3), None, BoundingBox=CREEK, LaunchPoint=at(906, 245), Safety=7.0),
+        mission("map", prior=None, BoundingBox=CREEK, LaunchPoint=at(906, 245), Safety=7.0),
+    ],
+    ids=["treatment", "fleet", "one boat"],
+)
+def test_no_leg_out_of_a_creek_leads_over_land(given):
+    completed = plan_mission(given, OPTIONS, call=local_call())
+    for vehicle in evaluate(completed).vehicles:
+        assert vehicle.outside_m <= 0.01
+        assert vehicle.length_ratio <= 1
+        assert vehicle.starts_at_launch_m == vehicle.ends_at_recovery_m == 0
+        assert vehicle.is_simple or vehicle.role is Role.SLAVE
+    assert any("out of sight of the free space" in text for text in completed.plan.warnings)
+
+
 def test_danger_zones_are_gone_round_and_the_danger_is_told():
     """The straight way to the east leads through a ferry's lane, which ends 40 m from the northern shore."""
     pond, launch = contour((0, 0), (800, 0), (800, 300), (0, 300)), at(10, 150)

@@ -94,6 +94,8 @@ class AssignRequest(Message, frozen=True, kw_only=True):
     ----------
     free
         Where vehicles may go.
+    water
+        What legs to and from the free space may cross; absent: they are straight.
     vehicles
         The fleet.
     share_free
@@ -113,6 +115,7 @@ class AssignRequest(Message, frozen=True, kw_only=True):
     """
 
     free: Polygon
+    water: Polygon | None = None
     vehicles: tuple[Vehicle, ...]
     share_free: bool = False
     footprint_m: float | None = None

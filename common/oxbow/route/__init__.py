@@ -1,5 +1,6 @@
 """Routes through the water: several methods behind one `Router`."""
 
+from oxbow.route.access import way_to
 from oxbow.route.danger import NO_DANGER, Danger
 from oxbow.route.dynamic import DynamicRouter
 from oxbow.route.methods import make_router
@@ -13,4 +14,5 @@ __all__ = [
     "RouteMethod",
     "Router",
     "make_router",
+    "way_to",
 ]
