@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import enum
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -98,12 +97,11 @@ def judged(polyline: FloatArray, mesh: Mesh, danger: Danger, method: RouteMethod
     polyline = _without_repeats(polyline)
     starts, ends = polyline[:-1], polyline[1:]
     at_start = danger.hazards_at(polyline[:1]).sum()
-    hazard = at_start + danger.hazards(starts, ends).sum()
     return Route(
         polyline=polyline,
         length_m=float(np.hypot(*(ends - starts).T).sum()),
         cost=float(danger.costs(starts, ends).sum() + danger.c_max_m * at_start),
-        danger=-math.expm1(-hazard),
+        danger=danger.probability(polyline),
         clearance_m=mesh.clearance_m(LineString(polyline)),
         method=method,
     )

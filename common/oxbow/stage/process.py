@@ -147,8 +147,7 @@ def _schema_of_custom(kind: Any) -> dict[str, Any]:
         return {"type": "string", "format": "binary", "description": f"{origin.__name__} as WKB, planar metres"}
     if origin is np.ndarray:
         return {"type": "array", "description": "array: dtype, shape, and the elements as little-endian bytes"}
-    # How msgspec asks a schema hook to say that it does not know a type: it then raises an error of its own.
-    raise NotImplementedError(kind)
+    raise TypeError(f"{kind!r} is in a message, and no schema says how it is sent")
 
 
 if __name__ == "__main__":
