@@ -21,7 +21,7 @@ from shapely.ops import substring
 
 from oxbow.contracts import FloatArray, FreeSpace, Place, Vehicle
 from oxbow.errors import Infeasible
-from oxbow.route import RouteMethod, Router, make_router, way_to
+from oxbow.route import RouteMethod, Router, Routes, make_router, way_to
 from oxbow.tolerances import ROUNDING_M
 
 __all__ = ["Approach", "Harbour"]
@@ -163,7 +163,8 @@ class Harbour:
 
     def __init__(self, space: FreeSpace, spacing_m: float) -> None:
         self.space = space
-        self._lanes = [_Lanes(space, APART * spacing_m * 0.5**step) for step in range(HALVINGS)]
+        shore = Routes(space.water)
+        self._lanes = [_Lanes(space, shore, APART * spacing_m * 0.5**step) for step in range(HALVINGS)]
 
     def approach(self, share: Polygon, vehicle: Vehicle) -> Approach:
         """The approach of a vehicle to its share.
@@ -216,6 +217,7 @@ class _Lanes:
     """The middle of the free space: far enough from its rim for a leg on either side."""
 
     space: FreeSpace
+    shore: Routes
     apart_m: float
 
     @cached_property
@@ -254,7 +256,7 @@ class _Lanes:
 
     def _entry(self, place: Place) -> FloatArray:
         """The way (n, 2) from a place, ashore or not, to the middle of the free space."""
-        return way_to(self._middle, self.space.water, place)
+        return way_to(self._middle, self.shore, place)
 
 
 @dataclass(frozen=True)

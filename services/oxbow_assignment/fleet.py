@@ -19,7 +19,7 @@ from shapely import LineString, Polygon
 
 from oxbow.contracts import FloatArray, Vehicle
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.route import NO_DANGER, Danger, RouteMethod, Router, make_router, way_to
+from oxbow.route import NO_DANGER, Danger, RouteMethod, Router, Routes, make_router, way_to
 
 __all__ = ["Fleet", "Ways"]
 
@@ -97,8 +97,9 @@ class Fleet:
         """
         if not slaves:
             raise InvalidMission("has no slave; expected one or more to treat the hot spots", where="vehicles")
-        out = tuple(LineString(way_to(free, water, slave.start)) for slave in slaves)
-        home = tuple(LineString(way_to(free, water, slave.recovery)[::-1]) for slave in slaves)
+        shore = Routes(water)
+        out = tuple(LineString(way_to(free, shore, slave.start)) for slave in slaves)
+        home = tuple(LineString(way_to(free, shore, slave.recovery)[::-1]) for slave in slaves)
         for slave, leg, back in zip(slaves, out, home, strict=True):
             if leg.length + back.length >= slave.length_m:
                 raise Infeasible(

@@ -16,11 +16,11 @@ from shapely.geometry.base import BaseGeometry
 from oxbow.contracts import FloatArray, FreeSpace, PathRequest, SpacingStep, WeightedArea
 from oxbow.errors import Infeasible
 from oxbow.recording import Layer, LayerKind, Show
+from oxbow.route.gate_routes import Routes
 from oxbow.sweep import from_sweep, to_sweep
 from oxbow_path.refinement import RefinementStep, Samples
 from oxbow_path.walk.legs import Passable, access
 from oxbow_path.walk.probe import Probe
-from oxbow_path.walk.routes import Routes
 from oxbow_path.walk.spacing import Budget
 from oxbow_path.walk.trial import Waters
 

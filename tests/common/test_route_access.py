@@ -5,7 +5,7 @@ import pytest
 from shapely import LineString, MultiPolygon, Point, box
 
 from oxbow.errors import Infeasible
-from oxbow.route import way_to
+from oxbow.route import Routes, way_to
 
 LAKE = box(0, 0, 100, 100)
 CREEK = box(100, 40, 160, 44).union(box(156, 40, 160, 90))
@@ -14,21 +14,21 @@ AREA = LAKE.buffer(-10)
 
 
 def test_from_inside_there_is_no_way():
-    assert way_to(AREA, WATER, (50, 50)).tolist() == [[50, 50], [50, 50]]
+    assert way_to(AREA, Routes(WATER), (50, 50)).tolist() == [[50, 50], [50, 50]]
 
 
 def test_straight_where_that_keeps_to_the_water():
-    assert way_to(AREA, WATER, (96, 50)).tolist() == [[96, 50], [90, 50]]
+    assert way_to(AREA, Routes(WATER), (96, 50)).tolist() == [[96, 50], [90, 50]]
 
 
 def test_straight_from_ashore():
-    assert way_to(AREA, WATER, (150, 95)).tolist() == [[150, 95], [90, 90]]
+    assert way_to(AREA, Routes(WATER), (150, 95)).tolist() == [[150, 95], [90, 90]]
 
 
 @pytest.mark.parametrize("area", [AREA, MultiPolygon([box(10, 10, 20, 20), box(60, 30, 90, 60)])])
 def test_round_the_corner_of_a_creek(area):
     """44 m down the creek, 58 along it and 10 over the lake, from middle to middle."""
-    way = way_to(area, WATER, (158, 88))
+    way = way_to(area, Routes(WATER), (158, 88))
     assert way[0].tolist() == [158, 88]
     assert WATER.buffer(1e-6).covers(LineString(way))
     assert area.distance(Point(way[-1])) < 1e-6
@@ -41,9 +41,9 @@ def test_round_the_corner_of_a_creek(area):
 def test_water_that_leads_elsewhere_is_refused():
     pond = box(200, 0, 250, 50)
     with pytest.raises(Infeasible, match="no way leads"):
-        way_to(AREA, MultiPolygon([WATER, pond]), (225, 25))
+        way_to(AREA, Routes(MultiPolygon([WATER, pond])), (225, 25))
 
 
 def test_the_same_way_wherever_the_site_lies():
-    moved = way_to(box(1010, 10, 1090, 90), box(1000, 0, 1100, 100), (1096, 50))
-    assert np.allclose(moved - [1000, 0], way_to(box(10, 10, 90, 90), LAKE, (96, 50)))
+    moved = way_to(box(1010, 10, 1090, 90), Routes(box(1000, 0, 1100, 100)), (1096, 50))
+    assert np.allclose(moved - [1000, 0], way_to(box(10, 10, 90, 90), Routes(LAKE), (96, 50)))

@@ -13,6 +13,7 @@ from shapely import LinearRing, LineString, Point, Polygon, box
 from oxbow.contracts import PathRequest
 from oxbow.errors import Infeasible, Internal
 from oxbow.reeb import cell_polygon
+from oxbow.route.gate_routes import Routes, taut
 from oxbow_path.conformance import require_conforming
 from oxbow_path.task import prepared_waters
 from oxbow_path.transect.circuit import plan_circuit
@@ -22,7 +23,6 @@ from oxbow_path.walk.gaps import reach_gaps
 from oxbow_path.walk.legs import Passable, access, joined
 from oxbow_path.walk.probe import Probe, covered
 from oxbow_path.walk.region import Brush, Walk, dilated, simply_connected
-from oxbow_path.walk.routes import Routes, taut
 from oxbow_path.walk.spacing import Budget, fitted
 from oxbow_path.walk.trial import Pattern, Trial
 

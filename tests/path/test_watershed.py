@@ -16,11 +16,11 @@ from oxbow.contracts import PathRequest
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.mesh import Mesh, mesh_area, propagate
 from oxbow.recording import Layer
+from oxbow.route.gate_routes import Routes
 from oxbow.sweep import from_sweep
 from oxbow.testing import nasty_polygons
 from oxbow_path.conformance import require_conforming
 from oxbow_path.task import Display, Task
-from oxbow_path.walk.routes import Routes
 from oxbow_path.walk.spacing import Budget, Fit
 from oxbow_path.walk.trial import Waters
 from oxbow_path.watershed import (

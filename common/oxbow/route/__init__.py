@@ -3,6 +3,7 @@
 from oxbow.route.access import way_to
 from oxbow.route.danger import NO_DANGER, Danger
 from oxbow.route.dynamic import DynamicRouter
+from oxbow.route.gate_routes import Routes
 from oxbow.route.methods import make_router
 from oxbow.route.route import Route, RouteMethod, Router
 
@@ -13,6 +14,7 @@ __all__ = [
     "Route",
     "RouteMethod",
     "Router",
+    "Routes",
     "make_router",
     "way_to",
 ]

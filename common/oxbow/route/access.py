@@ -4,33 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from shapely import MultiPolygon, Point, Polygon
+from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray, Place
 from oxbow.errors import Infeasible
-from oxbow.route.methods import make_router
-from oxbow.route.route import RouteMethod
+from oxbow.route.gate_routes import Routes
 from oxbow.tolerances import ROUNDING_M
 
 __all__ = ["way_to"]
 
-GOALS = 200
-"""So many places of the area's rim, about, may be the goal."""
 
-
-def way_to(area: BaseGeometry, water: Polygon | MultiPolygon, place: Place) -> FloatArray:
+def way_to(area: BaseGeometry, routes: Routes, place: Place) -> FloatArray:
     """The way from a place to where it first meets an area, shape (n, 2).
 
     Straight to the nearest place of the area, where that keeps to the water; or where the place is ashore, for
-    nobody knows then what lies between. Else by a route through the water, clear of its shores.
+    nobody knows then what lies between. Else along the middle of the water.
 
     Parameters
     ----------
     area
         Where to, in the water; parts of it may lie apart.
-    water
-        Where routes may run.
+    routes
+        Routes through the water.
     place
         Where from, outside the area or in it.
 
@@ -41,16 +37,11 @@ def way_to(area: BaseGeometry, water: Polygon | MultiPolygon, place: Place) -> F
     """
     point = Point(place)
     straight = shapely.shortest_line(point, area)
-    grown = water.buffer(ROUNDING_M)
-    if not grown.covers(point) or grown.covers(straight):
+    is_ashore = not shapely.dwithin(routes.water, point, ROUNDING_M)
+    if is_ashore or straight.difference(routes.water).length <= ROUNDING_M:
         return np.asarray(shapely.get_coordinates(straight))
-    router = make_router(RouteMethod.INCENTERS, water)
-    boundary = area.boundary
-    rim = shapely.get_coordinates(boundary.segmentize(boundary.length / GOALS))
-    goals = rim[:: max(1, len(rim) // GOALS)]
-    distances = router.distances(np.vstack([place, goals]))[0, 1:]
-    if not np.isfinite(distances).any():
-        raise Infeasible("lies in water from which no way leads to where it is to go", "LaunchPoint")
-    route = router.route(place, goals[np.argmin(distances)]).line
+    route = routes.to_area(np.array(place), area, routes.goals_in(area))
+    if route is None:
+        raise Infeasible("lies in water from which no way leads to the free space", "LaunchPoint")
     outside = shapely.get_parts(route.difference(area))
     return np.asarray(shapely.get_coordinates(outside[np.argmin(shapely.distance(outside, point))]))

@@ -12,9 +12,9 @@ from shapely.ops import substring
 
 from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
+from oxbow.route.gate_routes import Routes
 from oxbow_path.walk.probe import Probe
 from oxbow_path.walk.region import Brush, Walk, largest, simply_connected
-from oxbow_path.walk.routes import Routes
 
 __all__ = ["branch_to", "reach_gaps"]
 

@@ -22,10 +22,11 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
 from oxbow.contracts import FloatArray, Place
-from oxbow.errors import Infeasible, Internal
+from oxbow.errors import Infeasible, Internal, renamed
+from oxbow.route import way_to
+from oxbow.route.gate_routes import Routes, taut
 from oxbow.tolerances import ROUNDING_M
 from oxbow_path.walk.region import largest
-from oxbow_path.walk.routes import Routes, taut
 
 __all__ = ["Access", "Passable", "access", "is_plainly_simple", "joined"]
 
@@ -105,21 +106,19 @@ def access(place: Place, free: Polygon, water: Routes, *, where: str) -> Access:
     point = Point(place)
     if free.covers(point):
         return Access(np.array([place, place]))
-    straight = shapely.shortest_line(point, free)
+    with renamed({"LaunchPoint": where}):
+        way = LineString(way_to(free, water, place))
     if not water.water.covers(point):
-        return Access(shapely.get_coordinates(straight), ashore=True, beside=_beside_line(straight))
-    if water.water.covers(straight):
-        return _in_water(straight, water.water)
-    route = water.to_area(np.array(place), free, water.goals_in(free))
-    if route is None:
-        raise Infeasible(f"no way through the water leads from {place} to the free space", where)
-    clearance_m = shapely.distance(Point(straight.coords[-1]), water.water.boundary) / 2
-    around = water.water.intersection(box(*route.bounds).buffer(5 * clearance_m))
+        return Access(shapely.get_coordinates(way), ashore=True, beside=_beside_line(way))
+    if len(way.coords) == 2:
+        return _in_water(way, water.water)
+    clearance_m = shapely.distance(Point(way.coords[-1]), water.water.boundary) / 2
+    around = water.water.intersection(box(*way.bounds).buffer(5 * clearance_m))
     roomy = around.buffer(-clearance_m).union(point.buffer(4 * clearance_m).intersection(around))
-    return _in_water(shapely.get_parts(taut(route, roomy).difference(free))[0], water.water)
+    return _in_water(shapely.get_parts(taut(way, roomy).difference(free))[0], water.water)
 
 
-def _in_water(leg: LineString, water: Polygon) -> Access:
+def _in_water(leg: LineString, water: BaseGeometry) -> Access:
     near = _beside_line(leg).intersection(water)
     return Access(shapely.get_coordinates(leg), beside=near.buffer(ROUNDING_M))
 

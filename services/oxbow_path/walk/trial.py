@@ -10,12 +10,12 @@ import shapely
 from shapely import LineString, Point, Polygon
 
 from oxbow.contracts import Cell
+from oxbow.route.gate_routes import Routes
 from oxbow.tolerances import ROUNDING_M
 from oxbow_path.walk.gaps import branch_to, reach_gaps
 from oxbow_path.walk.legs import Access, Passable, is_plainly_simple, joined
 from oxbow_path.walk.probe import Probe
 from oxbow_path.walk.region import Brush, Circuit, Walk, clear_of_land, dilated, largest, simply_connected
-from oxbow_path.walk.routes import Routes
 
 __all__ = ["Pattern", "Trial", "Waters", "finished", "touches_entries", "walked"]
 

@@ -11,8 +11,8 @@ import numpy as np
 import shapely
 from shapely import LinearRing, LineString, Polygon
 
+from oxbow.route.gate_routes import Routes
 from oxbow_path.walk.region import Circuit
-from oxbow_path.walk.routes import Routes
 
 __all__ = ["contour_tree"]
 

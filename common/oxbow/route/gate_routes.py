@@ -7,12 +7,13 @@ these routes lead to whatever place of an area is nearest, and keep to the middl
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 
 import numpy as np
 import shapely
 from scipy.sparse import csr_array
-from shapely import LineString, Polygon
+from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import Indices
@@ -29,7 +30,7 @@ TAUT_POINTS = 200
 
 
 class Routes:
-    """Routes inside one polygon of water.
+    """Routes inside one water.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ class Routes:
         The shore is divided into edges no longer than this, so that gates stand about as close.
     """
 
-    def __init__(self, water: Polygon, detail_m: float) -> None:
+    def __init__(self, water: Polygon | MultiPolygon, detail_m: float = math.inf) -> None:
         self.water = water
         self.detail_m = detail_m
 
@@ -51,13 +52,13 @@ class Routes:
     def _graph(self) -> csr_array[np.float64]:
         return self._gates.arcs.graph(len(self._gates.places))
 
-    def goals_in(self, area: Polygon) -> Indices:
+    def goals_in(self, area: BaseGeometry) -> Indices:
         """The gates whose middles lie inside an area."""
         shapely.prepare(area)
         inside = shapely.contains_xy(area, self._gates.places)
         return np.flatnonzero(inside & (self._gates.mesh.twins >= 0))
 
-    def to_area(self, start: FloatArray, area: Polygon, goals: Indices) -> LineString | None:
+    def to_area(self, start: FloatArray, area: BaseGeometry, goals: Indices) -> LineString | None:
         """The shortest route from a point of the water into an area; None if none leads there.
 
         `goals` are the area's `goals_in`; an area too small to hold any is entered at a point of its own.
