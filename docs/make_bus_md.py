@@ -57,6 +57,7 @@ from oxbow.contracts import (
 )
 from oxbow.envelope import Envelope
 from oxbow.errors import ErrorCode, ErrorReply
+from oxbow.ids import MOST_ID_CHARACTERS
 from oxbow.introspection import Info, Ping, Stats
 from oxbow.recording import Layer, LayerKind, Stamped
 from oxbow.submission import SubmissionParameters
@@ -78,7 +79,8 @@ Oxbow's processes meet on [Zenoh](https://zenoh.io) 1.x, each in `client` mode a
   `[dtype, shape, bytes]`; the examples below show them as WKT and as lists of numbers.
 - Unless a field says otherwise, geometry is planar, in metres in the mission's local frame: x east, y north. A
   `Place` is such a point, `[x, y]`.
-- Ids are made of `A-Z a-z 0-9 _ . -`. No request is larger than {MAX_REQUEST_BYTES // 2**20} MiB.
+- Ids are 1 to {MOST_ID_CHARACTERS} of `A-Z a-z 0-9 _ . -`, the first of them not `.`.
+- No request is larger than {MAX_REQUEST_BYTES // 2**20} MiB.
 - An error is an error reply with an `ErrorReply` in JSON; any other encoding marks an error of Zenoh's own.
 - A query that has no reply at all was lost: ask again. Requests may be repeated under one `request_id`.
 - A stage with several replicas has a key for each. The caller chooses one that is alive, the one with the fewest

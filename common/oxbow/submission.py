@@ -103,7 +103,7 @@ class Submission:
         if self.parameters.id is not None:
             return self.parameters.id
         name = re.sub(r"[^A-Za-z0-9_.-]+", "-", self.mission.site_name or "")[:MOST_NAME_CHARACTERS]
-        return f"{name.strip('-') or 'mission'}-{self.fingerprint[:8]}"
+        return f"{name.strip('-.') or 'mission'}-{self.fingerprint[:8]}"
 
 
 @cache

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from oxbow.contracts import Method
+from oxbow.contracts import Method, checked_id
 from oxbow.errors import InvalidMission
 from oxbow.mission import Position
 from oxbow.submission import Submission, SubmissionParameters
@@ -59,7 +59,12 @@ def test_the_id_is_readable_and_names_the_content() -> None:
 @given(st.text())
 def test_any_site_name_makes_an_id(site_name: str) -> None:
     mission = msgspec.structs.replace(submission().mission, site_name=site_name)
-    assert re.fullmatch(r"[A-Za-z0-9_.-]{1,60}", Submission(mission).mission_id)
+    assert len(checked_id(Submission(mission).mission_id)) <= 60
+
+
+def test_a_site_name_that_begins_with_a_dot_makes_an_id() -> None:
+    mission = msgspec.structs.replace(submission().mission, site_name="..")
+    assert re.fullmatch(r"mission-[0-9a-f]{8}", Submission(mission).mission_id)
 
 
 parameters = st.builds(
@@ -69,7 +74,7 @@ parameters = st.builds(
     heading_rad=st.none() | st.floats(-10, 10),
     tolerance_m=st.none() | st.floats(0, 1e6),
     time_limit_s=st.none() | st.floats(1e-3, 1e6),
-    id=st.none() | st.from_regex(r"[A-Za-z0-9_.-]+", fullmatch=True),
+    id=st.none() | st.from_regex(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,127}", fullmatch=True),
     deadline_s=st.floats(1e-3, 1e6),
 )
 

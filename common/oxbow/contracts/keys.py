@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 
 from oxbow.errors import InvalidMission
+from oxbow.ids import checked_id, excerpt
 
 __all__ = [
     "ANY",
@@ -26,16 +27,6 @@ __all__ = [
 ]
 
 PREFIX = "oxbow/v1"
-_ID = re.compile(r"[A-Za-z0-9_.-]+")
-
-
-def checked_id(text: str, where: str = "id") -> str:
-    """`text`, if it may stand as one chunk of a key expression."""
-    if not _ID.fullmatch(text):
-        raise InvalidMission(f"is {text!r}; expected one or more of A-Z a-z 0-9 _ . -", where=where)
-    return text
-
-
 INTROSPECTION = ("ping", "info", "stats", "schema")
 ANY_LIVE = f"{PREFIX}/live/*/*"
 
@@ -93,7 +84,7 @@ class MissionKey:
         match = _MISSION_KEY.fullmatch(key)
         if match is None:
             expected = f"{PREFIX}/mission/{{id}}/{{what}}[/{{revision}}], each one name, number or {ANY}"
-            raise InvalidMission(f"is {key!r}; expected {expected}", where="key")
+            raise InvalidMission(f"is {excerpt(key)}; expected {expected}", where="key")
         mission_id, what, revision = match.groups()
         return cls(mission_id, what, int(revision) if revision and revision != ANY else revision)
 

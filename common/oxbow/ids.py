@@ -1,0 +1,38 @@
+"""Ids that come from outside and go into keys and file names: short, and of characters that mean nothing there."""
+
+from __future__ import annotations
+
+import re
+
+from oxbow.errors import InvalidMission
+
+__all__ = ["MOST_ID_CHARACTERS", "checked_id", "excerpt"]
+
+MOST_ID_CHARACTERS = 128
+"""Zenoh panics on keys of some 65 530 characters, and file systems take names of 255."""
+
+_SHOWN_CHARACTERS = 40
+_ID = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]*")
+
+
+def checked_id(text: str, where: str = "id") -> str:
+    """`text`, if it may stand as one chunk of a key expression, and in the name of a file.
+
+    Raises
+    ------
+    InvalidMission
+        It is empty, too long, begins with ``.`` or ``@``, or has a character that is not accepted.
+    """
+    if len(text) <= MOST_ID_CHARACTERS and _ID.fullmatch(text):
+        return text
+    accepted = f"expected 1 to {MOST_ID_CHARACTERS} of A-Z a-z 0-9 _ . -"
+    if text.startswith((".", "@")):
+        accepted = f"{accepted}, none that begins with {text[0]!r}"
+    raise InvalidMission(f"is {excerpt(text)}; {accepted}", where=where)
+
+
+def excerpt(text: str) -> str:
+    """`text` in quotes for an error message, its end cut off where it is long."""
+    if len(text) <= MOST_ID_CHARACTERS:
+        return repr(text)
+    return f"{text[:_SHOWN_CHARACTERS]!r}... ({len(text)} characters)"
