@@ -21,7 +21,7 @@ from oxbow.files import read_bytes, write_atomically
 from oxbow.frame import Position, lonlat
 from oxbow.plan import PlanOptions, PlanRecord
 from oxbow.prior import PriorFeature, PriorModel, parse_prior, prior_document
-from oxbow.strict_json import decode_json, document_of, gathered, gathered_part
+from oxbow.strict_json import decode_json, document_of, gathered, gathered_part, utf8
 from oxbow.vehicles import GivenVehicle, VehiclePath, require_distinct
 
 __all__ = [
@@ -287,7 +287,9 @@ def parse_mission(data: bytes) -> Mission:
     """
     if len(data) > MAX_REQUEST_BYTES:
         raise InvalidMission(f"is {len(data)} bytes; expected at most {MAX_REQUEST_BYTES}", where="Mission File")
-    document = gathered(decode_json(data, dict[str, msgspec.Raw], "Mission File"), FIELD_NAMES)
+    document = gathered(
+        decode_json(utf8(data, "Mission File"), dict[str, msgspec.Raw], "Mission File"), FIELD_NAMES
+    )
     names = [name for name in OutlineName if name in document]
     if len(names) > 1:
         raise InvalidMission("is given beside BoundingBox, its newer name; expected one of them", where="InBox")

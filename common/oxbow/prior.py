@@ -21,7 +21,7 @@ from shapely.geometry.base import BaseGeometry
 from oxbow.contracts import FloatArray, Variogram
 from oxbow.coordinates import GivenPoint, GivenPolygon, lonlat_of, require_wgs84
 from oxbow.errors import InvalidMission
-from oxbow.strict_json import decode_json, gathered
+from oxbow.strict_json import decode_json, gathered, utf8
 
 __all__ = ["PriorFeature", "PriorModel", "parse_prior", "prior_document"]
 
@@ -157,7 +157,7 @@ def parse_prior(data: bytes, name: str = "PriorModel") -> PriorModel:
         ``PriorModel.features[3].properties.weight``, and its value.
     """
     with _inside(name):
-        collection = _decoded(decode_json(data, dict[str, msgspec.Raw], ""), _Collection)
+        collection = _decoded(decode_json(utf8(data, ""), dict[str, msgspec.Raw], ""), _Collection)
         require_wgs84(collection.extra.get("crs"))
         features = [_feature(feature, index) for index, feature in enumerate(collection.features)]
         variogram = _variogram(bytes(collection.variogram)) if collection.variogram else None

@@ -15,6 +15,7 @@ from oxbow.errors import InvalidMission
 from oxbow.files import read_bytes
 from oxbow.prior import PriorModel, parse_prior
 from oxbow.raster import Raster, require_size
+from oxbow.strict_json import utf8
 
 __all__ = ["read_prior"]
 
@@ -54,7 +55,7 @@ def read_prior(path: Path) -> PriorModel:
 def _ascii_grid(path: Path) -> Raster:
     """Read an ESRI ASCII grid: a header of names and numbers, then rows of values from north to south."""
     name = str(path)
-    words = read_bytes(path, MAX_REQUEST_BYTES).decode("utf-8", "replace").split()
+    words = utf8(read_bytes(path, MAX_REQUEST_BYTES), name).decode("utf-8", "replace").split()
     begin = 0
     while begin < len(words) and words[begin].lower() in _HEADER:
         begin += 2

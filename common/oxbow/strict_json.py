@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Iterator
 from typing import Any, TypeVar
@@ -11,7 +12,7 @@ from msgspec import inspect
 
 from oxbow.errors import InvalidMission
 
-__all__ = ["decode_json", "document_of", "gathered", "gathered_part", "json_names"]
+__all__ = ["decode_json", "document_of", "gathered", "gathered_part", "json_names", "utf8"]
 
 T = TypeVar("T")
 
@@ -22,6 +23,36 @@ _MISSING = re.compile(r"Object missing required field `(.*)`")
 _UNKNOWN = re.compile(r"Object contains unknown field `(.*)`")
 _BYTE = re.compile(r" \(byte (\d+)\)")
 _STEP = re.compile(r"(?P<key>[^.\[\]]+)|\[(?P<index>\d+)\]|(?P<any>\[\.\.\.\])")
+
+
+_BYTE_ORDER_MARKS = {
+    codecs.BOM_UTF8: "utf-8",
+    codecs.BOM_UTF32_LE: "utf-32-le",  # before UTF-16, whose mark it begins with
+    codecs.BOM_UTF32_BE: "utf-32-be",
+    codecs.BOM_UTF16_LE: "utf-16-le",
+    codecs.BOM_UTF16_BE: "utf-16-be",
+}
+
+
+def utf8(data: bytes, name: str) -> bytes:
+    """A text file's content as UTF-8 without a byte order mark; a mark tells in which encoding it came.
+
+    Raises
+    ------
+    InvalidMission
+        It is not text in the encoding that its mark says.
+    """
+    for mark, encoding in _BYTE_ORDER_MARKS.items():
+        if not data.startswith(mark):
+            continue
+        text = data[len(mark) :]
+        if encoding == "utf-8":
+            return text
+        try:
+            return text.decode(encoding).encode()
+        except UnicodeError as error:
+            raise InvalidMission(f"is not {encoding.upper()}, as its byte order mark says", where=name) from error
+    return data
 
 
 def decode_json(data: bytes, kind: type[T], name: str, *, at: str = "") -> T:

@@ -7,6 +7,7 @@ not pay for algorithms.
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -273,7 +274,7 @@ def import_site(
     from oxbow_cli.arguments import position, save
 
     with renamed({DOCUMENT: str(site), f"{DOCUMENT}.type": f"{site}: type"}):
-        mission = mission_from_geojson(
+        imported = mission_from_geojson(
             read_bytes(site, MAX_REQUEST_BYTES),
             launch=position(launch, "--launch"),
             recovery=None if recovery is None else position(recovery, "--recovery"),
@@ -283,10 +284,12 @@ def import_site(
             minimal_spatial_rate_m=spacing,
             part=part,
         )
+    for note in imported.notes:
+        print(f"note: {note}", file=sys.stderr)
     if output is None:
-        print(mission_json(mission).decode(), end="")
+        print(mission_json(imported.mission).decode(), end="")
     else:
-        save(output, mission)
+        save(output, imported.mission)
 
 
 @app.command()

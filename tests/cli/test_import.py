@@ -53,3 +53,11 @@ def test_swapped_degrees_are_told(oxbow, site):
     result = oxbow("import", site, "--launch", "170.001,-43.999")
     assert result.returncode == 2
     assert "swapped" in result.stderr
+
+
+def test_what_is_passed_over_is_noted_beside_the_mission_file(oxbow, folder):
+    point = {"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [170.0, -44.0]}}
+    (folder / "site.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [SITE, point]}))
+    result = oxbow("import", "site.geojson", "--launch", "-43.999,170.001")
+    assert json.loads(result.stdout)["SiteName"] == "South Pond"
+    assert result.stderr == "note: passed over 1 Point: only polygons are water\n"

@@ -310,3 +310,9 @@ def test_examples_and_their_plans_follow_the_schema(path):
 def test_the_schema_refuses_what_the_parser_refuses(changes):
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(given_mission(**changes), SCHEMA)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-32"])
+def test_a_byte_order_mark_is_skipped(encoding):
+    text = json.dumps(given_mission(SiteName="Étang"), ensure_ascii=False)
+    assert parse_mission(text.encode(encoding)) == parsed(SiteName="Étang")

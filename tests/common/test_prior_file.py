@@ -17,6 +17,7 @@ from oxbow.raster import MAX_CELLS, Raster
 
 HEADER = "ncols 3\nnrows 2\nxllcorner 1.0\nyllcorner 46.0\ncellsize 0.01\nNODATA_value -1\n"
 GRID = HEADER + "1 2 2\n-1 2 2\n"
+COLLECTION = '{"type": "FeatureCollection", "crs": null, "features": []}'
 
 
 @pytest.fixture
@@ -117,6 +118,15 @@ def test_other_files_are_refused_with_their_name(written, name, text, says):
     with pytest.raises(InvalidMission, match=says) as caught:
         read_prior(written(text, name))
     assert name in caught.value.where
+
+
+@pytest.mark.parametrize(("text", "name"), [(GRID, "prior.asc"), (COLLECTION, "prior.json")])
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_byte_order_mark_is_skipped(written, text, name, encoding):
+    plain = read_prior(written(text, name))
+    path = written("", name)
+    path.write_text(text, encoding=encoding)
+    assert read_prior(path) == plain
 
 
 def test_a_missing_file_is_refused_with_its_name(tmp_path):
