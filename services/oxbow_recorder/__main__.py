@@ -17,6 +17,7 @@ from oxbow.contracts import ANY_LAYER, live_key
 from oxbow.errors import OxbowError
 from oxbow.lifetime import Lifetime
 from oxbow.recording import Stamped
+from oxbow_recorder.address import address_of
 from oxbow_recorder.live import serve
 from oxbow_recorder.recordings import Recordings
 
@@ -24,6 +25,9 @@ _log = logging.getLogger("oxbow_recorder")
 
 QUEUE = 4096
 """Layers waiting to be drawn; further ones are dropped: planning never waits for a recording."""
+
+_MOST_LOGGED = 300
+"""Characters of a key and of an error that are logged: both may hold what a stranger sent."""
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -37,10 +41,11 @@ def main(argv: list[str] | None = None) -> None:
 
     def record(key: str, payload: bytes) -> None:
         try:
+            address_of(key, payload)
             with lock:
                 recordings.add(decode(payload, Stamped))
         except (OxbowError, OSError) as error:
-            _log.error("a layer on %s is not recorded: %s", key, error)
+            _log.error("a layer on %s is not recorded: %s", key[:_MOST_LOGGED], str(error)[:_MOST_LOGGED])
 
     session = Session.join(options.connect, lambda: lifetime.over)
     if session is not None:

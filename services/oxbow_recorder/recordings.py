@@ -11,8 +11,10 @@ import rerun as rr
 
 from oxbow.frame import Frame
 from oxbow.recording import Stamped
+from oxbow_recorder.address import Run
 from oxbow_recorder.blueprint import blueprint
 from oxbow_recorder.drawing import draw
+from oxbow_recorder.files import part_path, recording_path, sweep
 
 __all__ = ["Recording", "Recordings"]
 
@@ -36,16 +38,16 @@ class Recording:
         Address of a server that viewers watch, if there is one.
     """
 
-    def __init__(self, folder: Path, mission_id: str, run: str, live: str | None = None) -> None:
-        self.path = folder / f"{mission_id}.rrd"
-        self._part = folder / f".{mission_id}.{run or 'run'}.part.rrd"
+    def __init__(self, folder: Path, run: Run, live: str | None = None) -> None:
+        self.path = recording_path(folder, run)
+        self._part = part_path(folder, run)
         self.seen = time.monotonic()
-        self._stream = rr.RecordingStream("oxbow", recording_id=f"{mission_id}-{run or 'run'}")
+        self._stream = rr.RecordingStream("oxbow", recording_id=f"{run.mission_id}-{run.run_id}")
         sinks: Sequence[rr.FileSink | rr.GrpcSink] = (
             [rr.FileSink(str(self._part))] if live is None else [rr.FileSink(str(self._part)), rr.GrpcSink(live)]
         )
         self._stream.set_sinks(*sinks, default_blueprint=blueprint())
-        self._stream.send_recording_name(mission_id)
+        self._stream.send_recording_name(run.mission_id)
 
     def add(self, stamped: Stamped) -> None:
         """Draw one layer."""
@@ -81,14 +83,15 @@ class Recordings:
         self.folder = folder
         self.live = live
         self._clock = clock
-        self._open: dict[tuple[str, str], Recording] = {}
+        self._open: dict[Run, Recording] = {}
         folder.mkdir(parents=True, exist_ok=True)
+        sweep(folder)
 
     def add(self, stamped: Stamped) -> None:
         """Draw a layer in its run's recording, and close that with its last one."""
-        run = (stamped.mission_id, stamped.request_id)
+        run = Run(mission_id=stamped.mission_id, run_id=stamped.request_id or "run")
         if run not in self._open:
-            self._open[run] = Recording(self.folder, *run, live=self.live)
+            self._open[run] = Recording(self.folder, run, live=self.live)
         self._open[run].add(stamped)
         if stamped.layer.stage == "mission" and stamped.layer.name in END:
             self._close(run)
@@ -104,5 +107,5 @@ class Recordings:
             if self._clock() - recording.seen > IDLE_S:
                 self._close(run)
 
-    def _close(self, run: tuple[str, str]) -> None:
+    def _close(self, run: Run) -> None:
         _log.info("wrote %s", self._open.pop(run).close())

@@ -13,7 +13,7 @@ from oxbow.bus import Session
 from oxbow.bus.router import start_router
 from oxbow.codec import encode
 from oxbow.contracts import layer_key
-from oxbow.recording import Layer, Stamped
+from oxbow.recording import Layer, LayerKind, Stamped
 
 pytestmark = pytest.mark.processes
 
@@ -48,11 +48,24 @@ def wait_until(holds):
         time.sleep(0.05)
 
 
-def show(bus, step):
+def show(bus, step, mission="m", run="r", key=None):
     line = shapely.LineString([(0, 0), (step, 1)])
     layer = Layer(stage="path", name="path", step=step, geometries=(line,))
-    stamped = Stamped(mission_id="m", request_id="r", time_s=1.7e9 + step, layer=layer)
-    bus.publish(layer_key("m", "path", "path"), encode(stamped), encoding="application/msgpack", droppable=True)
+    put(bus, layer, mission, run, key)
+
+
+def put(bus, layer, mission="m", run="r", key=None):
+    key = key or layer_key(mission, layer.stage, layer.name)
+    stamped = Stamped(mission_id=mission, request_id=run, time_s=1.7e9 + layer.step, layer=layer)
+    bus.publish(key, encode(stamped), encoding="application/msgpack", droppable=True)
+
+
+def end(bus, mission="m", run="r"):
+    put(bus, Layer(stage="mission", name="done", kind=LayerKind.LOG, text="done"), mission, run)
+
+
+def put_bytes(bus, payload):
+    bus.publish(layer_key("m", "path", "path"), payload, encoding="application/msgpack", droppable=True)
 
 
 def test_it_finishes_its_files_when_told_to_end(bus, recorder, tmp_path):
@@ -78,3 +91,22 @@ def test_showing_goes_on_without_it(bus, recorder, tmp_path):
     wait_until(lambda: not bus.audience(layer_key("m", "path", "path")))
     for step in range(2, 500):
         show(bus, step)
+
+
+def test_no_id_leads_out_of_the_folder_or_ends_it(bus, recorder, tmp_path):
+    """What is put on a key is anybody's; what is no layer of its key costs that layer alone."""
+    outside = tmp_path.parent / "evil.rrd"
+    outside.write_text("kept")
+    key = layer_key("m", "path", "path")
+    for mission, run in (("../evil", "r"), ("m", "/../../evil"), (str(outside.with_suffix("")), "r"), ("", "r")):
+        show(bus, 1, mission, run, key=key)
+    show(bus, 1, "other", key=key)
+    put_bytes(bus, b"\xc1")
+    put_bytes(bus, b"\x91" * 100_000)
+    for mission in ("m" * 128, "m"):
+        show(bus, 1, mission, "r" * 128)
+        end(bus, mission, "r" * 128)
+    wait_until((tmp_path / "m.rrd").exists)
+    assert recorder.poll() is None
+    assert outside.read_text() == "kept"
+    assert {path.name for path in tmp_path.iterdir()} == {"m.rrd", f"{'m' * 128}.rrd"}

@@ -1,0 +1,68 @@
+"""Whose a layer is: read from its bytes without decoding its geometry, and checked before all else."""
+
+from __future__ import annotations
+
+import msgspec
+
+from oxbow.contracts import checked_id, layer_key
+from oxbow.errors import InvalidMission
+
+__all__ = ["MOST_LAYER_BYTES", "Address", "Run", "address_of"]
+
+MOST_LAYER_BYTES = 32 * 2**20
+"""Larger layers are dropped: a lake's triangles take a few megabytes."""
+
+_END = frozenset({("mission", "done"), ("mission", "failed")})
+"""Stage and name of a mission's last layer."""
+
+
+class Run(msgspec.Struct, frozen=True, kw_only=True):
+    """One run of a mission; its ids may stand in a key and in a file's name."""
+
+    mission_id: str
+    run_id: str
+
+    def __post_init__(self) -> None:
+        checked_id(self.mission_id, where="mission_id")
+        checked_id(self.run_id, where="request_id")
+
+
+class Address(msgspec.Struct, frozen=True, kw_only=True):
+    """The run that a layer belongs to, and whether it is that run's last."""
+
+    run: Run
+    is_last: bool
+
+
+class _Name(msgspec.Struct):
+    stage: str
+    name: str
+
+
+class _Stamp(msgspec.Struct):
+    """The part of an `oxbow.recording.Stamped` that names it."""
+
+    mission_id: str
+    layer: _Name
+    request_id: str = ""
+
+
+def address_of(key: str, payload: bytes) -> Address:
+    """The address of an encoded `oxbow.recording.Stamped` that was put on `key`.
+
+    Raises
+    ------
+    InvalidMission
+        It is no such message or too large, an id of it is none, or the key says something else than the message.
+    """
+    if len(payload) > MOST_LAYER_BYTES:
+        raise InvalidMission(f"is {len(payload)} bytes; expected at most {MOST_LAYER_BYTES}", where="layer")
+    try:
+        stamp = msgspec.msgpack.decode(payload, type=_Stamp)
+    except (ValueError, RecursionError) as error:  # of DecodeError, UnicodeDecodeError is no kind
+        raise InvalidMission(f"is no layer: {error}", where="layer") from error
+    run = Run(mission_id=stamp.mission_id, run_id=stamp.request_id or "run")
+    own_key = layer_key(stamp.mission_id, stamp.layer.stage, stamp.layer.name)
+    if key != own_key:
+        raise InvalidMission(f"was put on another key than its own, {own_key}", where="layer")
+    return Address(run=run, is_last=(stamp.layer.stage, stamp.layer.name) in _END)

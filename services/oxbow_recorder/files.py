@@ -1,0 +1,50 @@
+"""Where recordings are kept, and where they are written until they are whole."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import re
+import time
+from pathlib import Path
+
+from oxbow.errors import InvalidMission
+from oxbow_recorder.address import Run
+
+__all__ = ["part_path", "recording_path", "sweep"]
+
+ABANDONED_S = 24 * 3600.0
+"""A part to which nothing was added for so long is nobody's: the recorder that wrote it was killed."""
+
+_PART = re.compile(r"\.[A-Za-z0-9_.-]+\.part\.rrd")
+_log = logging.getLogger("oxbow_recorder")
+
+
+def recording_path(folder: Path, run: Run) -> Path:
+    """Where the recording of a run ends up; an older one of its mission is replaced as a whole."""
+    return _within(folder, f"{run.mission_id}.rrd")
+
+
+def part_path(folder: Path, run: Run) -> Path:
+    """Where the recording of a run is written; the run is shortened, since names of files are limited."""
+    digest = hashlib.sha256(run.run_id.encode()).hexdigest()[:16]
+    return _within(folder, f".{run.mission_id}.{digest}.part.rrd")
+
+
+def _within(folder: Path, name: str) -> Path:
+    path = folder / name
+    if path.parent.resolve() != folder.resolve():
+        raise InvalidMission(f"is {name!r}; expected the name of a file", where="recording")
+    return path
+
+
+def sweep(folder: Path) -> None:
+    """Remove what killed recorders left behind long ago."""
+    oldest_s = time.time() - ABANDONED_S
+    for path in folder.iterdir():
+        try:
+            if _PART.fullmatch(path.name) and path.is_file() and path.stat().st_mtime < oldest_s:
+                path.unlink()
+                _log.info("removed %s, which was left behind", path)
+        except OSError as error:
+            _log.warning("%s cannot be removed: %s", path, error)
