@@ -86,13 +86,13 @@ def test_danger_counts_against_a_range():
 
 
 def test_who_is_less_fit_is_sent_less():
-    far = zone(box(0, 0, 10, 10))
     for fit, unfit in (("one", "two"), ("two", "one")):
         fleet = tuple(
             replaced(slave(START, name=name, length_m=4_000.0), danger_factor=3.0 if name == unfit else 1.0)
             for name in ("one", "two")
         )
-        assert [sortie.vehicle for sortie in reply(far, vehicles=fleet).sorties] == [fit]
+        sorties = reply(zone(BAR), vehicles=fleet, danger_detour_m=100.0).sorties
+        assert [sortie.vehicle for sortie in sorties] == [fit]
 
 
 def test_without_zones_nothing_changes():

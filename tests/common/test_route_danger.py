@@ -33,12 +33,12 @@ def edges(*places):
     return places[:-1], places[1:]
 
 
-def test_an_edge_costs_as_the_report_says():
+def test_an_edge_costs_its_length_and_what_its_hazard_counts():
     danger = Danger((per_crossing(0.3),), c_max_m=50.0, a=1.5)
     starts, ends = edges((0, 50), (100, 50), (100, 0))
     costs = danger.costs(starts, ends)
-    assert costs[0] == pytest.approx(100 + 50 * math.log(1.5 / (1 - 0.3)), abs=1e-4)
-    assert costs[1] == pytest.approx(50 + 50 * math.log(1.5))
+    assert costs[0] == pytest.approx(100 - 50 * 1.5 * math.log(1 - 0.3), abs=1e-4)
+    assert costs[1] == 50.0
 
 
 def test_probabilities_of_harm_multiply_over_edges():
@@ -53,12 +53,14 @@ def test_probabilities_of_harm_multiply_over_edges():
 @quick
 @given(cuts=st.lists(st.floats(0.01, 0.99), max_size=6, unique=True), back=st.booleans())
 def test_danger_does_not_depend_on_how_a_way_is_divided(cuts, back):
-    danger = Danger((per_metre(0.02), per_crossing(0.4), per_crossing(0.1, box(50, 0, 55, 100))))
+    zones = (per_metre(0.02), per_crossing(0.4), per_crossing(0.1, box(50, 0, 55, 100)))
+    danger = Danger(zones, c_max_m=100.0, a=3.0)
     share = np.array([0.0, *sorted(cuts, reverse=back), 1.0] if not back else [1.0, *sorted(cuts)[::-1], 0.0])
     places = np.column_stack([100 * share, 40 + 20 * share])
-    assert danger.hazards(places[:-1], places[1:]).sum() == pytest.approx(
-        danger.hazards(*edges((0, 40), (100, 60))).sum(), abs=1e-6
-    )
+    for figure in (danger.hazards, danger.costs):
+        assert figure(places[:-1], places[1:]).sum() == pytest.approx(
+            figure(*edges((0, 40), (100, 60))).sum(), rel=1e-6
+        )
 
 
 def test_each_crossing_counts_once():
@@ -91,6 +93,63 @@ def test_without_zones_routes_are_unchanged(seed, method):
 
 
 @every_method
+@quick
+@given(seed=st.integers(0, 10_000), factor=st.floats(1.0, 1e3))
+def test_zones_without_danger_leave_routes_unchanged(seed, method, factor):
+    water = scene(seed)
+    start, goal = places_in(water, 2, seed)
+    plain = make_router(method, water).route(start, goal)
+    harmless = Danger((per_metre(0.0), per_crossing(0.0)), c_max_m=1e4, a=factor)
+    other = make_router(method, water, harmless).route(start, goal)
+    assert np.array_equal(plain.polyline, other.polyline)
+    assert other.cost == plain.length_m
+
+
+@quick
+@given(
+    seed=st.integers(0, 10_000),
+    factors=st.lists(st.floats(1.0, 50.0), min_size=2, max_size=4),
+    crossing=st.floats(0.0, 0.9),
+    metre=st.floats(0.0, 0.05),
+)
+def test_who_is_less_fit_never_takes_more_danger(seed, factors, crossing, metre):
+    water = scene(seed, obstacles=3)
+    start, goal = places_in(water, 2, seed)
+    zones = (per_crossing(crossing, box(10, 10, 50, 45)), per_metre(metre), per_crossing(0.3, box(45, 60, 90, 75)))
+    dangers = [Danger(zones, c_max_m=40.0, a=factor) for factor in sorted(factors)]
+    routes = [make_router(RouteMethod.VISIBILITY, water, danger).route(start, goal) for danger in dangers]
+    taken = np.array([route.danger for route in routes])
+    assert (np.diff(taken) <= 1e-6).all()
+    lengths = np.array([route.length_m for route in routes])
+    assert (np.diff(lengths) >= -1e-3).all()
+
+
+def test_a_less_fit_vehicle_goes_round_where_a_fit_one_does():
+    """The way round has more edges than the way through."""
+    lane = per_crossing(0.9, box(40, 20, 60, 80))
+    for factor in (1.0, 1.5, 10.0, 1e4):
+        danger = Danger((lane,), c_max_m=50.0, a=factor)
+        assert make_router(RouteMethod.VISIBILITY, WATER, danger).route((10, 50), (90, 50)).danger == 0.0
+
+
+@quick
+@given(seed=st.integers(0, 10_000), detail_m=st.floats(5.0, 30.0), factor=st.floats(1.0, 9.0))
+def test_costs_do_not_depend_on_how_the_water_is_triangulated(seed, detail_m, factor):
+    water = scene(seed, obstacles=3)
+    start, goal = places_in(water, 2, seed)
+    lane = box(10, 10, 50, 45)
+    found = [
+        make_router(
+            RouteMethod.VISIBILITY,
+            shapely.segmentize(water, detail),
+            Danger((per_crossing(0.2, shapely.segmentize(lane, detail)),), c_max_m=100.0, a=factor),
+        ).route(start, goal)
+        for detail in (1e9, detail_m)
+    ]
+    assert found[0].cost == pytest.approx(found[1].cost, rel=1e-6)
+
+
+@every_method
 @pytest.mark.parametrize("zone", [per_metre(0.05), per_crossing(0.6)])
 def test_a_zone_is_travelled_or_avoided_as_it_is_worth(method, zone):
     start, goal = (20, 50), (80, 50)
@@ -119,8 +178,7 @@ def test_distances_are_the_costs_of_the_routes(seed, method):
     for i, j in ((0, 1), (1, 3)):
         route = router.route(points[i], points[j])
         assert route.cost == pytest.approx(distances[i, j], rel=1e-6)
-        edges_there = len(route.polyline) - 1
-        worth_m = route.length_m + 100.0 * (edges_there * math.log(1.1) - math.log1p(-route.danger))
+        worth_m = route.length_m - 100.0 * 1.1 * math.log1p(-route.danger)
         assert route.cost == pytest.approx(worth_m)
 
 

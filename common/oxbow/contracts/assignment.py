@@ -37,7 +37,8 @@ class Vehicle(Message, frozen=True, kw_only=True):
     start, recovery
         Where it is now and where it ends.
     danger_factor
-        At least 1: how much less fit it is where danger is, `a` of Innocenti, Pollini and Bracci 2006, section 3.
+        At least 1: how many times as much danger counts for it; `a` of Innocenti, Pollini and Bracci 2006,
+        section 3.
 
     Raises
     ------

@@ -1,12 +1,19 @@
 """Danger zones: what it may cost to travel through them, and how probable harm is on the way.
 
-M. Innocenti, L. Pollini and A. Bracci (2006), section 3. A route of edges k that do harm with probabilities P_k
-does harm with P = 1 - prod(1 - P_k); an edge of length c costs c + c_max log(a / (1 - P_k)), so that costs add up
-along a route while probabilities multiply.
+M. Innocenti, L. Pollini and A. Bracci (2006), section 3. A route of L edges k that do harm with probabilities P_k
+does harm with P_P = 1 - prod(1 - P_k). The report lets an edge of length c_k cost c_k + c_MAX log(a / (1 - P_k)),
+so that costs add up along a route while probabilities multiply: W_P = sum(c_k) + c_MAX (L log(a) - log(1 - P_P)).
 
-Departures: a zone's probability holds for each metre or for each crossing, and P_k of an edge follows from how
-much of the zone it passes, so that P does not depend on how a route is divided into edges; without zones the term
-is left out altogether, whatever `a`; `a` is at least 1, for Dijkstra's algorithm takes no negative costs.
+Departure: here W_P = sum(c_k) - c_MAX a log(1 - P_P). The report's term L log(a) counts edges, dangerous or
+not: it depends on how a route is divided, and sends a vehicle of large a through a zone wherever the way round it
+has more edges: the less fit vehicle goes where the fitter one does not. As a factor of the hazard -log(1 - P_k), a
+acts where danger is and nowhere else: one crossing counts for a vehicle of factor a as a crossings for one of
+factor 1. Of two cheapest routes, that for the larger a never has the greater P_P: W_P is a length plus a times a
+hazard, and what minimises such a sum has the less of a term the more that counts.
+
+Further departures: a zone's probability holds for each metre or for each crossing, and P_k of an edge follows from
+how much of the zone it passes, so that W_P and P_P do not depend on how a route is divided into edges; a zone
+without danger changes no route; a is at least 1, the fittest vehicle's.
 """
 
 from __future__ import annotations
@@ -41,7 +48,7 @@ class Danger:
     c_max_m
         The report's c_max: the detour, in metres, that a chance of no harm e times as good is worth.
     a
-        The report's a, >= 1: each edge of a route costs c_max log(a) more for a vehicle less fit for it.
+        The report's a, >= 1: how many times as much a hazard counts for a vehicle less fit for it.
 
     Raises
     ------
@@ -62,9 +69,17 @@ class Danger:
     def costs(self, starts: FloatArray, ends: FloatArray) -> FloatArray:
         """Costs in metres, shape (n,), of the straight edges from `starts` to `ends`, both of shape (n, 2)."""
         length = np.hypot(*(ends - starts).T)
-        if not self.zones:
-            return np.asarray(length)
-        return np.asarray(length + self.c_max_m * (math.log(self.a) + self.hazards(starts, ends)))
+        return np.asarray(length + self.hazard_m * self.hazards(starts, ends))
+
+    @property
+    def hazard_m(self) -> float:
+        """What a hazard of 1 counts, in metres: c_MAX a."""
+        return self.c_max_m * self.a
+
+    @cached_property
+    def outlines(self) -> tuple[BaseGeometry, ...]:
+        """Where costs change: the outlines of all zones that do harm."""
+        return tuple(zone.area.boundary for zone in self.zones if zone.hazard > 0.0)
 
     def hazards(self, starts: FloatArray, ends: FloatArray) -> FloatArray:
         """-log(1 - P) of straight edges, shape (n,); who starts inside a zone has entered it before."""

@@ -34,7 +34,7 @@ def make_router(method: RouteMethod, water: Polygon | MultiPolygon, danger: Dang
     InvalidMission
         The water is empty or not a valid polygon.
     """
-    return router_on(Mesh.of(water, [zone.area.boundary for zone in danger.zones]), method, danger)
+    return router_on(Mesh.of(water, danger.outlines), method, danger)
 
 
 def router_on(mesh: Mesh, method: RouteMethod, danger: Danger) -> Router:

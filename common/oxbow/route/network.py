@@ -128,7 +128,7 @@ class NetworkRouter:
         costs = found.costs if self.drawn is None else self._line_costs(found)
         # Starting inside a danger zone costs as well.
         danger = self.network.danger
-        matrix = costs + danger.c_max_m * danger.hazards_at(points)[:, None]
+        matrix = costs + danger.hazard_m * danger.hazards_at(points)[:, None]
         matrix = np.minimum(matrix, matrix.T)
         np.fill_diagonal(matrix, 0.0)
         return matrix

@@ -100,7 +100,7 @@ def judged(polyline: FloatArray, mesh: Mesh, danger: Danger, method: RouteMethod
     return Route(
         polyline=polyline,
         length_m=float(np.hypot(*(ends - starts).T).sum()),
-        cost=float(danger.costs(starts, ends).sum() + danger.c_max_m * at_start),
+        cost=float(danger.costs(starts, ends).sum() + danger.hazard_m * at_start),
         danger=danger.probability(polyline),
         clearance_m=mesh.clearance_m(LineString(polyline)),
         method=method,

@@ -50,7 +50,7 @@ class VisibilityGraph:
     @cached_property
     def bends(self) -> Bends:
         """Where routes can bend."""
-        return Bends.of(self.mesh, any_turn=bool(self.danger.zones))
+        return Bends.of(self.mesh, any_turn=bool(self.danger.outlines))
 
     @property
     def places(self) -> FloatArray:
