@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
-from oxbow.contracts import Conformance, Draw, LeftSpot, Measures, Message, Method, Role, require_finite
+from oxbow.contracts import (
+    MOST_DEADLINE_S,
+    Conformance,
+    Draw,
+    LeftSpot,
+    Measures,
+    Message,
+    Method,
+    Role,
+    require_finite,
+)
 from oxbow.frame import Position
 
 __all__ = [
@@ -16,6 +26,9 @@ __all__ = [
     "TreatmentRecord",
     "VehicleRecord",
 ]
+
+MOST_SEED = 2**53
+"""Every JSON reader has integers up to here exactly."""
 
 
 class PlanOptions(Message, frozen=True, kw_only=True):
@@ -36,8 +49,9 @@ class PlanOptions(Message, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         require_finite(self, "heading_rad")
-        require_finite(self, "time_limit_s", above=0.0)
-        require_finite(self, "seed", "tolerance_m", least=0.0)
+        require_finite(self, "time_limit_s", above=0.0, most=MOST_DEADLINE_S)
+        require_finite(self, "seed", least=0, most=MOST_SEED)
+        require_finite(self, "tolerance_m", least=0.0)
 
 
 class PlanCertificate(Measures, frozen=True, kw_only=True):

@@ -12,7 +12,7 @@ from urllib.parse import quote
 
 import msgspec
 
-from oxbow.contracts import DEFAULT_DEADLINE_S, checked_id, require_finite
+from oxbow.contracts import DEFAULT_DEADLINE_S, MOST_DEADLINE_S, checked_id, require_finite
 from oxbow.errors import InvalidMission
 from oxbow.mission import Mission, PlanOptions, mission_json, parse_mission
 
@@ -29,7 +29,7 @@ class SubmissionParameters(PlanOptions, frozen=True, kw_only=True, forbid_unknow
     id
         The mission's id; by default one is made of the site's name and the content.
     deadline_s
-        Seconds that planning may take, its wait for a free planner not counted.
+        Seconds that planning may take, its wait for a free planner not counted; at most a day.
     """
 
     id: str | None = None
@@ -37,7 +37,7 @@ class SubmissionParameters(PlanOptions, frozen=True, kw_only=True, forbid_unknow
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_finite(self, "deadline_s", above=0.0)
+        require_finite(self, "deadline_s", above=0.0, most=MOST_DEADLINE_S)
         if self.id is not None:
             checked_id(self.id)
 

@@ -13,10 +13,12 @@ import platformdirs
 from oxbow.bus import DEFAULT_ENDPOINT, Bus
 from oxbow.errors import Internal, OxbowError, Unavailable
 from oxbow.lifetime import Lifetime
+from oxbow_mission.database import Database
 from oxbow_mission.planner import Planner
 from oxbow_mission.registry import Registry
+from oxbow_mission.reports import Reports
 from oxbow_mission.service import MissionService
-from oxbow_mission.store import Store
+from oxbow_mission.store import SCHEMA, Store
 from oxbow_mission.vitals import Vitals
 
 _log = logging.getLogger("oxbow_mission")
@@ -28,11 +30,13 @@ def main(argv: list[str] | None = None) -> None:
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s")
     lifetime = Lifetime(options.parent)
     try:
-        with Store(options.home) as store:
+        with Database(options.home, SCHEMA, on_lost=lifetime.end) as database:
+            store = Store(database)
             bus = Bus.join(options.connect, lambda: lifetime.over)
             if bus is not None:
                 with bus, Registry(store, bus) as registry:
                     _serve(bus, registry, options, lifetime)
+            database.require_intact()
     except OxbowError as error:
         _log.error("%s", error)
         sys.exit(4 if isinstance(error, Unavailable) else 1)
@@ -41,7 +45,7 @@ def main(argv: list[str] | None = None) -> None:
 def _serve(bus: Bus, registry: Registry, options: argparse.Namespace, lifetime: Lifetime) -> None:
     vitals = Vitals(bus, options.instance, registry.store.waiting)
     planner = Planner(registry, bus, vitals, options.workers, on_failure=lifetime.end)
-    MissionService(bus, registry, options.instance)
+    MissionService(bus, registry, Reports(registry.store.database, registry.store), options.instance)
     _log.info("serves missions kept in %s", options.home)
     lifetime.wait()
     if planner.failed:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import threading
 import time
 from typing import Self
@@ -12,12 +11,15 @@ import msgspec
 
 from oxbow.bus import Session
 from oxbow.closing import Closing
-from oxbow.contracts import MissionKey, MissionState, MissionStatus, checked_id, mission_key
-from oxbow.errors import ErrorReply, InvalidMission, OxbowError, Unavailable
+from oxbow.contracts import MissionKey, MissionState, MissionStatus, mission_key
+from oxbow.errors import ErrorReply, OxbowError, Unavailable
 from oxbow.submission import Submission
 from oxbow_mission.store import Job, Request, Revision, Store
 
 __all__ = ["Registry"]
+
+MOST_ANSWERED_CHARACTERS = 1024
+"""Longer ids, percent-encoded, are not answered: no sender could mean them."""
 
 
 class Registry(Closing):
@@ -71,23 +73,23 @@ class Registry(Closing):
             self._changed.notify_all()
             return status
 
-    def refuse(self, mission_id: str, document: bytes, error: OxbowError) -> None:
-        """Let it be known that a request was invalid: its sender may be listening to the status alone.
+    def refuse(self, mission_id: str, error: OxbowError) -> None:
+        """Let it be known that a request was refused: its sender may be listening to the status alone.
 
-        An id that cannot be kept is answered under its percent-encoded form.
+        Nothing is kept of it, and it takes no revision: where the mission stands remains as it was. An id that
+        cannot be kept is answered under its percent-encoded form.
         """
-        reply = ErrorReply.of(error)
-        try:
-            checked_id(mission_id)
-        except InvalidMission:
-            status = MissionStatus(
-                mission_id=mission_id, revision=0, state=MissionState.FAILED, error=reply, time_s=time.time()
-            )
-            self._publish_status(status, quote(mission_id, safe=""))
+        chunk = quote(mission_id, safe="")
+        if len(chunk) > MOST_ANSWERED_CHARACTERS:
             return
-        with self._changed:
-            status = self.store.refuse(mission_id, hashlib.sha256(document).hexdigest(), error)
-            self._announce(status)
+        status = MissionStatus(
+            mission_id=mission_id,
+            revision=0,
+            state=MissionState.FAILED,
+            error=ErrorReply.of(error),
+            time_s=time.time(),
+        )
+        self._publish_status(status, chunk)
 
     # ----------------------------------------------------------------- planning
 
@@ -140,7 +142,7 @@ class Registry(Closing):
         if status.state is MissionState.DONE:
             plan = self.store.plan(Revision.of(status))
             self.bus.publish(mission_key(status.mission_id, "plan"), plan)
-            if is_replan(status.revision):
+            if self.is_replan(Revision.of(status)):
                 self.bus.publish(mission_key(status.mission_id, "replan"), plan)
         self._publish_status(status)
         self.store.mark_announced(Revision.of(status))
@@ -173,7 +175,6 @@ class Registry(Closing):
             kept = self.store.statuses(mission_id)
             return [self._running.get(Revision.of(status), status) for status in kept]
 
-
-def is_replan(revision: int) -> bool:
-    """Whether a revision's plan takes the place of what guidance may be following already."""
-    return revision > 1
+    def is_replan(self, revision: Revision) -> bool:
+        """Whether a revision's plan takes the place of what guidance may be following already."""
+        return revision.number > self.store.planned(revision.mission_id)[0].number

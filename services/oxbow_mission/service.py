@@ -10,7 +10,6 @@ import msgspec
 from oxbow.bus import Bus
 from oxbow.contracts import (
     ANY,
-    MAX_REQUEST_BYTES,
     PLAN_KEY,
     MissionKey,
     MissionStatus,
@@ -21,7 +20,8 @@ from oxbow.contracts import (
 from oxbow.errors import Internal, InvalidMission, OxbowError
 from oxbow.site import Site
 from oxbow.submission import Submission
-from oxbow_mission.registry import Registry, is_replan
+from oxbow_mission.registry import Registry
+from oxbow_mission.reports import Reports
 from oxbow_mission.store import Revision
 
 __all__ = ["MissionService"]
@@ -48,12 +48,15 @@ class MissionService:
         Where to serve.
     registry
         Where missions stand.
+    reports
+        Where guidance's reports are kept.
     instance
         The name to be seen alive under.
     """
 
-    def __init__(self, bus: Bus, registry: Registry, instance: str) -> None:
+    def __init__(self, bus: Bus, registry: Registry, reports: Reports, instance: str) -> None:
         self.registry = registry
+        self.reports = reports
         bus.subscribe(_any("request"), self._on_request, queue_size=MOST_UNREAD)
         bus.subscribe(_any("report"), self._on_report, queue_size=MOST_UNREAD)
         bus.answer(_any("request"), self._submit, workers=4, queue_size=MOST_QUEUED)
@@ -71,21 +74,16 @@ class MissionService:
             self._take_in(document, {"id": mission_id})
         except OxbowError as error:
             _log.warning("mission %s: refused: %s", mission_id, error)
-            self.registry.refuse(mission_id, document, error)
+            self.registry.refuse(mission_id, error)
         except Exception as error:  # noqa: BLE001 - becomes an `internal` error
             _log.exception("mission %s: refused", mission_id)
-            self.registry.refuse(
-                mission_id, document, Internal(f"{type(error).__name__}: {error}", where="mission")
-            )
+            self.registry.refuse(mission_id, Internal(f"{type(error).__name__}: {error}", where="mission"))
 
     def _on_report(self, key: str, payload: bytes) -> None:
         try:
-            mission_id = checked_id(MissionKey.parse(key).mission_id)
-            _require_size(payload)
-        except InvalidMission as error:
-            _log.warning("report on %s: refused: %s", key, error)
-        else:
-            self.registry.store.add_report(mission_id, payload)
+            self.reports.add(checked_id(MissionKey.parse(key).mission_id), payload)
+        except OxbowError as error:
+            _log.warning("report on %.200s: refused: %s", key, error)
 
     # ----------------------------------------------------------------- queries
 
@@ -110,9 +108,11 @@ class MissionService:
         """Plans that are kept: the latest under its mission's key, any under a key of its own."""
         asked = MissionKey.parse(key)
         kept: dict[str, Revision] = {}
+        first: dict[str, Revision] = {}
         for each in self.registry.store.planned(_asked_id(asked)):
             number = None if asked.revision is None else each.number
-            if asked.revision in (None, ANY, each.number) and (asked.what == "plan" or is_replan(each.number)):
+            is_replan = first.setdefault(each.mission_id, each) != each
+            if asked.revision in (None, ANY, each.number) and (asked.what == "plan" or is_replan):
                 kept[str(MissionKey(each.mission_id, asked.what, number))] = each
         _require_kept(kept, asked)
         for own_key, each in kept.items():
@@ -139,8 +139,3 @@ def _require_kept(found: Sized, asked: MissionKey) -> None:
         raise InvalidMission(
             "is not kept here; expected a mission, or a revision of it, handed in before", where=str(asked)
         )
-
-
-def _require_size(payload: bytes) -> None:
-    if len(payload) > MAX_REQUEST_BYTES:
-        raise InvalidMission(f"is {len(payload)} bytes; expected at most {MAX_REQUEST_BYTES}", where="report")

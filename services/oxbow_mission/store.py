@@ -1,4 +1,4 @@
-"""Everything the mission service must not forget: requests, revisions, plans and reports, in one SQLite file.
+"""Everything the mission service must not forget of its missions: requests, revisions and plans.
 
 A change that a method makes is on the disk when the method returns (WAL, synchronous=FULL), so a process
 killed at any moment loses nothing that it had told anyone.
@@ -6,33 +6,30 @@ killed at any moment loses nothing that it had told anyone.
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
-import os
+import logging
 import sqlite3
-import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import msgspec
 
-from oxbow.closing import Closing
-from oxbow.contracts import MissionState, MissionStatus
-from oxbow.errors import ErrorCode, ErrorReply, Internal, OxbowError, Unavailable
+from oxbow.contracts import MissionState, MissionStatus, checked_id
+from oxbow.errors import ErrorCode, ErrorReply, Internal, InvalidMission, OxbowError
+from oxbow_mission.database import Database, Schema
 
-__all__ = ["Job", "Request", "Revision", "Store"]
+__all__ = ["SCHEMA", "Job", "Request", "Revision", "Store"]
 
-SCHEMA_VERSION = 1
-MAX_ATTEMPTS = 10
-"""A revision that was being planned at so many deaths of the service is taken for their cause, and fails."""
+MAX_ATTEMPTS = 3
+"""A revision that so many planner processes died of fails."""
 
-_SCHEMA = f"""
-BEGIN;
+SCHEMA = Schema(
+    version=2,
+    script="""
 CREATE TABLE revision (
     mission_id TEXT NOT NULL,
     revision INTEGER NOT NULL,
+    client TEXT NOT NULL DEFAULT '',
     state TEXT NOT NULL,
     attempts INTEGER NOT NULL DEFAULT 0,
     announced INTEGER NOT NULL DEFAULT FALSE,
@@ -52,20 +49,30 @@ CREATE TABLE report (
     payload BLOB NOT NULL
 ) STRICT;
 CREATE INDEX report_of_mission ON report (mission_id);
-PRAGMA user_version = {SCHEMA_VERSION};
-COMMIT;
-"""
+""",
+    upgrades={
+        # Schema 1 kept refused requests as revisions, which were none; and counted deaths of the whole service.
+        1: """
+DELETE FROM revision WHERE state = 'failed' AND length(document) = 0;
+ALTER TABLE revision ADD COLUMN client TEXT NOT NULL DEFAULT '';
+UPDATE revision SET attempts = 0;
+""",
+    },
+)
+
+_log = logging.getLogger(__name__)
 
 _STATUS = "mission_id, revision, state, error, changed_s"
 _LATEST = "revision = (SELECT max(revision) FROM revision AS other WHERE other.mission_id = revision.mission_id)"
 
 # A mission's revisions are planned one after another, each once the outcome of the one before is announced:
 # otherwise an old plan could be published after a newer one.
-_NEXT = """
-SELECT rowid FROM revision AS next WHERE state = 'accepted' AND NOT announced AND NOT EXISTS (
+_WAITING = """
+state = 'accepted' AND NOT announced AND NOT EXISTS (
     SELECT 1 FROM revision AS earlier
-    WHERE earlier.mission_id = next.mission_id AND earlier.revision < next.revision AND NOT earlier.announced
-) ORDER BY rowid LIMIT 1
+    WHERE earlier.mission_id = revision.mission_id AND earlier.revision < revision.revision
+    AND NOT earlier.announced
+)
 """
 
 
@@ -89,110 +96,62 @@ class Revision:
     def of(cls, status: MissionStatus) -> Revision:
         return cls(status.mission_id, status.revision)
 
+    def __str__(self) -> str:
+        return f"mission {self.mission_id}, revision {self.number}"
+
 
 @dataclass(frozen=True)
 class Job:
-    """A revision claimed for planning."""
+    """A revision claimed for planning, and whose it is."""
 
     revision: Revision
     request: Request
+    client: str = ""
 
 
-class Store(Closing):
+class Store:
     """Missions and their revisions; safe to share between threads, not between processes.
 
     Parameters
     ----------
-    home
-        The folder of the store, made where it is missing. One process at a time holds it, until it closes the
-        store or dies: what was being planned by a process that died is `accepted` again.
-
-    Raises
-    ------
-    Unavailable
-        Another process holds the folder, it was written by another version, or it cannot be written.
+    database
+        Where they are kept. What was being planned by a process that died is `accepted` again, and what can be
+        neither planned nor named on the bus is set aside.
     """
 
-    def __init__(self, home: Path) -> None:
-        self.path = home / "missions.sqlite3"
-        self._mutex = threading.RLock()
-        with contextlib.ExitStack() as stack:
-            try:
-                home.mkdir(parents=True, exist_ok=True)
-                self._lock = stack.enter_context((home / "missions.lock").open("a+"))
-                self._hold(home)
-                self._db = stack.enter_context(
-                    contextlib.closing(sqlite3.connect(self.path, check_same_thread=False))
-                )
-                self._set_up()
-                self._resume()
-            except (OSError, sqlite3.Error) as error:
-                raise Unavailable(f"cannot keep missions: {error}", where=str(home)) from error
-            self._stack = stack.pop_all()
-
-    def _hold(self, home: Path) -> None:
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            self._lock.seek(0)
-            holder = self._lock.read().strip() or "unknown"
-            raise Unavailable(
-                f"is in use by the mission service with process id {holder}; stop it, or choose another folder",
-                where=str(home),
-            ) from error
-        self._lock.truncate(0)
-        self._lock.write(f"{os.getpid()}\n")
-        self._lock.flush()
-
-    def _set_up(self) -> None:
-        self._db.row_factory = sqlite3.Row
-        self._db.execute("PRAGMA journal_mode = WAL")
-        self._db.execute("PRAGMA synchronous = FULL")
-        version = self._db.execute("PRAGMA user_version").fetchone()[0]
-        if version == 0:
-            self._db.executescript(_SCHEMA)
-        elif version != SCHEMA_VERSION:
-            raise Unavailable(f"has schema {version}; this version reads {SCHEMA_VERSION}", where=str(self.path))
-
-    def close(self) -> None:
-        """Let another process have the folder."""
-        with self._mutex:
-            self._stack.close()
+    def __init__(self, database: Database) -> None:
+        self.database = database
+        with self.database.transaction() as db:
+            _set_aside_unfit(db)
+            db.execute("UPDATE revision SET state = 'accepted' WHERE state = 'planning'")
 
     # ----------------------------------------------------------------- requests
 
-    def accept(self, mission_id: str, request: Request) -> MissionStatus:
+    def accept(self, mission_id: str, request: Request, client: str = "") -> MissionStatus:
         """Keep a request, as a new revision unless the mission's latest one is the same and can still be of use.
 
         A revision that failed for want of a stage, time or luck may well succeed now, so it is asked for anew; one
         that is invalid or infeasible would fail again.
         """
-        return self._add(mission_id, request, MissionState.ACCEPTED, None)
-
-    def refuse(self, mission_id: str, fingerprint: str, error: OxbowError) -> MissionStatus:
-        """Keep, as a failed revision, that a request was invalid."""
-        request = Request(b"", b"", fingerprint)
-        return self._add(mission_id, request, MissionState.FAILED, error)
-
-    def _add(
-        self, mission_id: str, request: Request, state: MissionState, error: OxbowError | None
-    ) -> MissionStatus:
-        with self._transaction() as db:
+        checked_id(mission_id)
+        with self.database.transaction() as db:
             latest = db.execute(
                 f"SELECT {_STATUS}, fingerprint FROM revision WHERE mission_id = ? AND {_LATEST}",
                 (mission_id,),
             ).fetchone()
-            if latest is not None and latest["fingerprint"] == request.fingerprint and _is_settled(latest):
-                return _status(latest)
+            if latest is not None and latest["fingerprint"] == request.fingerprint:
+                known = next(_statuses([latest]), None)
+                if known is not None and _is_settled(known):
+                    return known
             now_s = time.time()
             row = db.execute(
-                "INSERT INTO revision (mission_id, revision, state, error, changed_s, accepted_s,"
-                f" fingerprint, parameters, document) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) RETURNING {_STATUS}",
+                "INSERT INTO revision (mission_id, revision, client, state, changed_s, accepted_s,"
+                f" fingerprint, parameters, document) VALUES (?, ?, ?, 'accepted', ?, ?, ?, ?, ?)"
+                f" RETURNING {_STATUS}",
                 (
                     mission_id,
                     latest["revision"] + 1 if latest else 1,
-                    state,
-                    _error_json(error),
+                    client,
                     now_s,
                     now_s,
                     request.fingerprint,
@@ -200,34 +159,60 @@ class Store(Closing):
                     request.document,
                 ),
             ).fetchone()
-            return _status(row)
+        return _status(row)
+
+    def knows(self, mission_id: str) -> bool:
+        """Whether a mission of this id was accepted."""
+        with self.database.reading() as db:
+            found = db.execute("SELECT 1 FROM revision WHERE mission_id = ? LIMIT 1", (mission_id,)).fetchone()
+        return found is not None
 
     # ----------------------------------------------------------------- planning
 
-    def claim(self) -> Job | None:
-        """Take the oldest accepted revision for planning, or None where nothing waits."""
-        with self._transaction() as db:
+    def waiting_clients(self) -> list[str]:
+        """Whose revisions could be planned now, who has waited longest first."""
+        with self.database.reading() as db:
+            rows = db.execute(
+                f"SELECT client FROM revision WHERE {_WAITING} GROUP BY client ORDER BY min(rowid)"
+            ).fetchall()
+        return [row["client"] for row in rows]
+
+    def claim(self, client: str | None = None) -> Job | None:
+        """Take the oldest accepted revision, of one client or of all, for planning; None where nothing waits."""
+        with self.database.transaction() as db:
             row = db.execute(
-                f"UPDATE revision SET state = 'planning', attempts = attempts + 1, changed_s = ?"
-                f" WHERE rowid = ({_NEXT}) RETURNING mission_id, revision, document, parameters, fingerprint",
-                (time.time(),),
+                "UPDATE revision SET state = 'planning', changed_s = ? WHERE rowid = ("
+                f"SELECT rowid FROM revision WHERE client = coalesce(?, client) AND {_WAITING}"
+                " ORDER BY rowid LIMIT 1)"
+                " RETURNING mission_id, revision, client, document, parameters, fingerprint",
+                (time.time(), client),
             ).fetchone()
         if row is None:
             return None
         request = Request(row["document"], row["parameters"], row["fingerprint"])
-        return Job(Revision(row["mission_id"], row["revision"]), request)
+        return Job(Revision(row["mission_id"], row["revision"]), request, row["client"])
 
     def finish(self, revision: Revision, plan: bytes) -> MissionStatus:
         """Keep the plan of a claimed revision."""
         return self._settle(revision, MissionState.DONE, plan=plan)
 
     def fail(self, revision: Revision, error: OxbowError) -> MissionStatus:
-        """Keep why a claimed revision has no plan."""
+        """Keep why a revision that is waiting or being planned has no plan."""
         return self._settle(revision, MissionState.FAILED, error=error)
 
     def release(self, revision: Revision) -> MissionStatus:
         """Give a claimed revision back unplanned, for another time."""
         return self._settle(revision, MissionState.ACCEPTED)
+
+    def note_death(self, revision: Revision) -> int:
+        """Note that the process that planned a revision died of it; how many have by now."""
+        with self.database.transaction() as db:
+            row = db.execute(
+                "UPDATE revision SET attempts = attempts + 1 WHERE mission_id = ? AND revision = ?"
+                " RETURNING attempts",
+                (revision.mission_id, revision.number),
+            ).fetchone()
+        return 0 if row is None else int(row["attempts"])
 
     def _settle(
         self,
@@ -237,43 +222,31 @@ class Store(Closing):
         plan: bytes | None = None,
         error: OxbowError | None = None,
     ) -> MissionStatus:
-        with self._transaction() as db:
+        origins = ("planning", "accepted" if state is MissionState.FAILED else "planning")
+        with self.database.transaction() as db:
             row = db.execute(
-                "UPDATE revision SET state = ?, plan = ?, error = ?, changed_s = ?,"
-                " attempts = attempts - (? = 'accepted')"
-                f" WHERE mission_id = ? AND revision = ? AND state = 'planning' RETURNING {_STATUS}",
-                (state, plan, _error_json(error), time.time(), state, revision.mission_id, revision.number),
+                "UPDATE revision SET state = ?, plan = ?, error = ?, changed_s = ?"
+                f" WHERE mission_id = ? AND revision = ? AND state IN (?, ?) RETURNING {_STATUS}",
+                (state, plan, _error_json(error), time.time(), revision.mission_id, revision.number, *origins),
             ).fetchone()
         if row is None:
-            raise Internal(
-                "is not being planned", where=f"mission {revision.mission_id}, revision {revision.number}"
-            )
+            raise Internal("is not being planned", where=str(revision))
         return _status(row)
-
-    def _resume(self) -> None:
-        cause = Internal(f"the mission service died {MAX_ATTEMPTS} times while it planned this")
-        with self._transaction() as db:
-            db.execute(
-                "UPDATE revision SET state = 'failed', error = ?, changed_s = ? WHERE state = 'planning'"
-                " AND attempts >= ?",
-                (_error_json(cause), time.time(), MAX_ATTEMPTS),
-            )
-            db.execute("UPDATE revision SET state = 'accepted' WHERE state = 'planning'")
 
     # ----------------------------------------------------------------- announcing
 
     def unannounced(self) -> list[MissionStatus]:
         """The outcomes that the world may not have heard of, oldest first."""
-        with self._mutex:
-            rows = self._db.execute(
+        with self.database.reading() as db:
+            rows = db.execute(
                 f"SELECT {_STATUS} FROM revision WHERE NOT announced AND state IN ('done', 'failed')"
                 " ORDER BY rowid"
             ).fetchall()
-        return [_status(row) for row in rows]
+        return list(_statuses(rows))
 
     def mark_announced(self, revision: Revision) -> None:
         """Note that an outcome was published."""
-        with self._transaction() as db:
+        with self.database.transaction() as db:
             db.execute(
                 "UPDATE revision SET announced = TRUE WHERE mission_id = ? AND revision = ?",
                 (revision.mission_id, revision.number),
@@ -283,18 +256,18 @@ class Store(Closing):
 
     def statuses(self, mission_id: str | None = None) -> list[MissionStatus]:
         """The status of the latest revision of one mission, or of all; empty where there is none."""
-        with self._mutex:
-            rows = self._db.execute(
+        with self.database.reading() as db:
+            rows = db.execute(
                 f"SELECT {_STATUS} FROM revision WHERE {_LATEST} AND mission_id = coalesce(?, mission_id)"
                 " ORDER BY rowid",
                 (mission_id,),
             ).fetchall()
-        return [_status(row) for row in rows]
+        return list(_statuses(rows))
 
     def status(self, revision: Revision) -> MissionStatus:
         """The status of one revision that exists."""
-        with self._mutex:
-            row = self._db.execute(
+        with self.database.reading() as db:
+            row = db.execute(
                 f"SELECT {_STATUS} FROM revision WHERE mission_id = ? AND revision = ?",
                 (revision.mission_id, revision.number),
             ).fetchone()
@@ -302,64 +275,82 @@ class Store(Closing):
 
     def waiting(self) -> int:
         """How many revisions wait to be planned."""
-        with self._mutex:
-            row = self._db.execute("SELECT count(*) FROM revision WHERE state = 'accepted' AND NOT announced")
+        with self.database.reading() as db:
+            row = db.execute("SELECT count(*) FROM revision WHERE state = 'accepted' AND NOT announced")
             return int(row.fetchone()[0])
 
-    def planned(self, mission_id: str | None = None) -> list[Revision]:
-        """The revisions that have a plan, by mission and number; those of one mission where given."""
-        with self._mutex:
-            rows = self._db.execute(
-                "SELECT mission_id, revision FROM revision WHERE state = 'done'"
-                " AND mission_id = coalesce(?, mission_id) ORDER BY mission_id, revision",
+    def open_revisions(self, mission_id: str) -> list[Revision]:
+        """The revisions of a mission that wait or are being planned, the newest first."""
+        with self.database.reading() as db:
+            rows = db.execute(
+                "SELECT mission_id, revision FROM revision WHERE mission_id = ?"
+                " AND state IN ('accepted', 'planning') ORDER BY revision DESC",
                 (mission_id,),
             ).fetchall()
         return [Revision(*row) for row in rows]
 
+    def planned(self, mission_id: str | None = None) -> list[Revision]:
+        """The revisions that have a plan, by mission and number; those of one mission where given."""
+        with self.database.reading() as db:
+            rows = db.execute(
+                "SELECT mission_id, revision FROM revision WHERE state = 'done'"
+                " AND mission_id = coalesce(?, mission_id) ORDER BY mission_id, revision",
+                (mission_id,),
+            ).fetchall()
+        return [Revision(*row) for row in rows if _fits(row["mission_id"])]
+
     def plan(self, revision: Revision) -> bytes:
         """The completed Mission File (JSON) of a revision that is done."""
-        with self._mutex:
-            row: dict[str, bytes] = self._db.execute(
+        with self.database.reading() as db:
+            row: dict[str, bytes] = db.execute(
                 "SELECT plan FROM revision WHERE mission_id = ? AND revision = ?",
                 (revision.mission_id, revision.number),
             ).fetchone()
         return row["plan"]
 
-    # ----------------------------------------------------------------- reports
 
-    def add_report(self, mission_id: str, payload: bytes) -> None:
-        """Keep what guidance reports of a mission, as it came."""
-        with self._transaction() as db:
-            db.execute("INSERT INTO report VALUES (?, ?, ?)", (mission_id, time.time(), payload))
-
-    def reports(self, mission_id: str) -> list[bytes]:
-        """The reports of a mission, oldest first."""
-        with self._mutex:
-            rows = self._db.execute(
-                "SELECT payload FROM report WHERE mission_id = ? ORDER BY rowid", (mission_id,)
-            ).fetchall()
-        return [row["payload"] for row in rows]
-
-    @contextlib.contextmanager
-    def _transaction(self) -> Iterator[sqlite3.Connection]:
-        with self._mutex, self._db:
-            yield self._db
+def _set_aside_unfit(db: sqlite3.Connection) -> None:
+    """Have missions whose id cannot stand in a key wait no more: nobody could be told of them."""
+    cause = InvalidMission("can be no key of the bus", where="id")
+    for (mission_id,) in db.execute("SELECT DISTINCT mission_id FROM revision WHERE NOT announced").fetchall():
+        if not _fits(mission_id):
+            _log.error("mission %.200r is set aside: its id can be no key of the bus", mission_id)
+            db.execute(
+                "UPDATE revision SET state = 'failed', error = ?, announced = TRUE"
+                " WHERE mission_id = ? AND NOT announced",
+                (_error_json(cause), mission_id),
+            )
 
 
-def _is_settled(row: sqlite3.Row) -> bool:
+def _fits(mission_id: str) -> bool:
+    """Whether a mission's id can stand in a key."""
+    try:
+        checked_id(mission_id)
+    except InvalidMission:
+        return False
+    return True
+
+
+def _is_settled(status: MissionStatus) -> bool:
     """Whether asking again for the same would change nothing."""
-    if row["state"] != MissionState.FAILED:
-        return True
-    return msgspec.json.decode(row["error"], type=ErrorReply).code in (
-        ErrorCode.INVALID_MISSION,
-        ErrorCode.INFEASIBLE,
-    )
+    return status.error is None or status.error.code in (ErrorCode.INVALID_MISSION, ErrorCode.INFEASIBLE)
+
+
+def _statuses(rows: Iterable[sqlite3.Row]) -> Iterator[MissionStatus]:
+    """The statuses of rows; one that cannot be read is logged, and hides no other."""
+    for row in rows:
+        try:
+            yield _status(row)
+        except (ValueError, OxbowError) as error:
+            _log.error(
+                "mission %.200r, revision %s: passed over: %.300s", row["mission_id"], row["revision"], error
+            )
 
 
 def _status(row: sqlite3.Row) -> MissionStatus:
     state = MissionState(row["state"])
     return MissionStatus(
-        mission_id=row["mission_id"],
+        mission_id=checked_id(row["mission_id"]),
         revision=row["revision"],
         state=state,
         fraction=1.0 if state is MissionState.DONE else 0.0,

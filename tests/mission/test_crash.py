@@ -22,7 +22,8 @@ from oxbow.bus import Bus
 from oxbow.contracts import MissionState, MissionStatus
 from oxbow.errors import Internal
 from oxbow.mission import parse_mission
-from oxbow_mission.store import Request, Store
+from oxbow_mission.database import Database
+from oxbow_mission.store import SCHEMA, Request, Store
 
 pytestmark = pytest.mark.processes
 
@@ -72,7 +73,8 @@ def test_a_full_disk_loses_no_mission(
 def test_what_was_kept_but_not_yet_published_is_published_at_the_start(
     bus: Bus, tmp_path: Path, start_service: Callable[[], Process]
 ) -> None:
-    with Store(tmp_path) as store:
+    with Database(tmp_path, SCHEMA) as database:
+        store = Store(database)
         store.accept("lake", Request(mission_file(), b"{}", "print"))
         job = store.claim()
         assert job is not None

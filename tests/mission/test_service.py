@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import sqlite3
 import threading
+import time
 from pathlib import Path
 from typing import TypeVar
 
@@ -147,7 +148,32 @@ def test_an_invalid_mission_is_refused_by_query_and_by_put(
     assert status.error is not None
     with pytest.raises(InvalidMission, match=message):
         raise status.error.error()
-    assert client.status("invalid") == status
+    assert status.revision == 0
+    with pytest.raises(InvalidMission, match="not kept"):
+        client.status("invalid")
+
+
+def test_a_refused_put_changes_nothing_of_the_mission_and_publishes_no_replan(client: Client, bus: Bus) -> None:
+    client.plan(mission_file(), mission_id="refused")
+    with (
+        listening(bus, mission_key("refused", "status")) as statuses,
+        listening(bus, mission_key("refused", "replan")) as replans,
+    ):
+        bus.publish(mission_key("refused", "request"), b"{")
+        assert status_of(statuses).revision == 0
+        assert client.status("refused").state is MissionState.DONE
+        bus.publish(mission_key("refused", "request"), mission_file())
+        assert status_of(statuses).state is MissionState.DONE
+        assert replans.empty()
+
+
+def test_the_first_plan_after_a_failure_is_no_replan(client: Client) -> None:
+    with pytest.raises(Infeasible):
+        client.plan(mission_file(), mission_id="at-last", seed=INFEASIBLE_SEED)
+    with client.replans("at-last", timeout_s=WAIT_S) as replans:
+        for safety in (1, 2):
+            client.plan(mission_file(Safety=safety), mission_id="at-last")
+        assert next(replans).revision == 3
 
 
 def test_an_id_that_cannot_be_kept_is_answered_under_its_encoded_form(client: Client, bus: Bus) -> None:
@@ -256,13 +282,23 @@ def test_an_unknown_mission_has_no_status(client: Client) -> None:
 
 
 def test_reports_are_stored(client: Client, bus: Bus, home: Path) -> None:
-    for payload in (b'{"speed_mps": 1}', b'{"speed_mps": 2}'):
-        bus.publish(mission_key("reported", "report"), payload)
-    # Puts of one session are dealt with in order, and so is a request for a status that follows.
     client.plan(mission_file(), mission_id="reported")
+    for mission_id, payload in (
+        ("reported", b'{"v": 1}'),
+        ("unheard-of", b"{}"),
+        ("reported", b'{"v": 2}'),
+    ):
+        bus.publish(mission_key(mission_id, "report"), payload)
+    give_up = time.monotonic() + WAIT_S
+    while len(rows := stored_reports(home)) < 2:
+        assert time.monotonic() < give_up
+        time.sleep(0.02)
+    assert rows == [("reported", b'{"v": 1}'), ("reported", b'{"v": 2}')]
+
+
+def stored_reports(home: Path) -> list[tuple[str, bytes]]:
     with contextlib.closing(sqlite3.connect(f"file:{home}/missions.sqlite3?mode=ro", uri=True)) as db:
-        rows = db.execute("SELECT payload FROM report WHERE mission_id = 'reported' ORDER BY rowid").fetchall()
-    assert rows == [(b'{"speed_mps": 1}',), (b'{"speed_mps": 2}',)]
+        return db.execute("SELECT mission_id, payload FROM report ORDER BY rowid").fetchall()
 
 
 # --------------------------------------------------------------------------- layers

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
-import sqlite3
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,17 +15,24 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from oxbow.contracts import MissionState
 from oxbow.errors import Infeasible, Internal, InvalidMission, OxbowError, Unavailable
-from oxbow_mission.store import MAX_ATTEMPTS, Job, Request, Revision, Store
+from oxbow_mission.database import Database
+from oxbow_mission.store import SCHEMA, Job, Request, Revision, Store
 
 
 def request(content: str) -> Request:
     return Request(document=content.encode(), parameters=b"{}", fingerprint=f"print of {content}")
 
 
+@contextlib.contextmanager
+def opened(home: Path) -> Iterator[Store]:
+    with Database(home, SCHEMA) as database:
+        yield Store(database)
+
+
 @pytest.fixture
 def store(tmp_path: Path) -> Iterator[Store]:
-    with Store(tmp_path) as opened:
-        yield opened
+    with opened(tmp_path) as found:
+        yield found
 
 
 def claimed(store: Store) -> Job:
@@ -82,17 +89,6 @@ def test_a_revision_waits_until_the_one_before_is_announced(store: Store) -> Non
     assert claimed(store).request == request("b")
 
 
-def test_a_refused_request_is_kept_as_a_failure_beside_the_plan(store: Store) -> None:
-    store.accept("lake", request("a"))
-    store.finish(claimed(store).revision, b"plan of a")
-    refused = store.refuse("lake", "print of junk", InvalidMission("is not JSON", where="Mission File"))
-    assert (refused.revision, refused.state) == (2, MissionState.FAILED)
-    assert refused.error is not None
-    assert refused.error.where == "Mission File"
-    assert store.planned("lake") == [Revision("lake", 1)]
-    assert store.refuse("lake", "print of junk", InvalidMission("is not JSON")).revision == 2
-
-
 def test_an_outcome_is_final(store: Store) -> None:
     store.accept("lake", request("a"))
     revision = claimed(store).revision
@@ -104,58 +100,83 @@ def test_an_outcome_is_final(store: Store) -> None:
     assert store.plan(revision) == b"plan"
 
 
-def test_one_process_at_a_time(store: Store, tmp_path: Path) -> None:
-    with pytest.raises(Unavailable, match="process id"):
-        Store(tmp_path)
-    store.close()
-    Store(tmp_path).close()
-
-
-def test_a_newer_schema_is_left_alone(store: Store, tmp_path: Path) -> None:
-    store.close()
-    db = sqlite3.connect(store.path)
-    db.execute("PRAGMA user_version = 99")
-    db.close()
-    with pytest.raises(Unavailable, match="schema 99"):
-        Store(tmp_path)
-
-
-def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
-    (tmp_path / "file").write_bytes(b"")
-    with pytest.raises(Unavailable, match="cannot keep missions"):
-        Store(tmp_path / "file" / "home")
-    (tmp_path / "missions.sqlite3").write_bytes(b"no database" * 1000)
-    with pytest.raises(Unavailable, match="not a database"):
-        Store(tmp_path)
-
-
-def test_what_kills_the_service_time_after_time_fails(tmp_path: Path) -> None:
-    with Store(tmp_path) as store:
-        store.accept("lake", request("a"))
-    for _ in range(MAX_ATTEMPTS):
-        with Store(tmp_path) as store:
+def test_a_stop_or_a_crash_blames_no_mission(tmp_path: Path) -> None:
+    for _ in range(20):
+        with opened(tmp_path) as store:
+            store.accept("lake", request("a"))
             claimed(store)
-    with Store(tmp_path) as store:
-        assert store.claim() is None
-        [status] = store.unannounced()
-    assert status.error is not None
-    assert f"died {MAX_ATTEMPTS} times" in status.error.message
-
-
-def test_an_orderly_stop_is_no_attempt(tmp_path: Path) -> None:
-    for content in ["a"] * (2 * MAX_ATTEMPTS):
-        with Store(tmp_path) as store:
-            store.accept("lake", request(content))
-            store.release(claimed(store).revision)
-    with Store(tmp_path) as store:
+    with opened(tmp_path) as store:
         assert claimed(store).revision == Revision("lake", 1)
 
 
-def test_reports_are_kept_in_order(store: Store) -> None:
-    for payload in (b"1", b"2"):
-        store.add_report("lake", payload)
-    store.add_report("sea", b"3")
-    assert store.reports("lake") == [b"1", b"2"]
+def test_deaths_of_planner_processes_are_counted_over_restarts(tmp_path: Path) -> None:
+    for deaths in (1, 2):
+        with opened(tmp_path) as store:
+            store.accept("lake", request("a"))
+            assert store.note_death(claimed(store).revision) == deaths
+
+
+def test_each_client_has_its_own_row_to_wait_in(store: Store) -> None:
+    for mission_id, client in (("a1", "a"), ("a2", "a"), ("b1", "b"), ("a3", "a")):
+        store.accept(mission_id, request("x"), client)
+    assert store.waiting_clients() == ["a", "b"]
+    job = store.claim("b")
+    assert job is not None
+    assert (job.revision.mission_id, job.client) == ("b1", "b")
+    assert store.claim("b") is None
+
+
+def test_what_waits_can_be_failed_before_it_is_planned(store: Store) -> None:
+    store.accept("lake", request("a"))
+    [revision] = store.open_revisions("lake")
+    store.fail(revision, Internal("cancelled"))
+    assert store.claim() is None
+    assert store.open_revisions("lake") == []
+
+
+def test_a_row_that_cannot_be_read_hides_no_other(store: Store, caplog: pytest.LogCaptureFixture) -> None:
+    for mission_id in ("lake", "sea", "pond"):
+        store.accept(mission_id, request("a"))
+    with store.database.transaction() as db:
+        db.execute("UPDATE revision SET state = 'odd' WHERE mission_id = 'sea'")
+        db.execute("UPDATE revision SET error = '{' WHERE mission_id = 'pond'")
+    assert [status.mission_id for status in store.statuses()] == ["lake"]
+    assert "sea" in caplog.text
+    assert "pond" in caplog.text
+    assert store.accept("pond", request("a")).revision == 2
+
+
+@pytest.mark.parametrize("mission_id", ["a" * 65_530, "@lake", "a/b", "*"])
+def test_an_id_that_can_be_no_key_is_set_aside(tmp_path: Path, mission_id: str) -> None:
+    with opened(tmp_path) as store:
+        with pytest.raises(InvalidMission):
+            store.accept(mission_id, request("a"))
+        store.accept("old", request("a"))
+        with store.database.transaction() as db:
+            db.execute("UPDATE revision SET mission_id = ?", (mission_id,))
+        store.accept("lake", request("a"))
+    with opened(tmp_path) as store:
+        assert claimed(store).revision.mission_id == "lake"
+        assert store.claim() is None
+        assert store.unannounced() == []
+        assert [status.mission_id for status in store.statuses()] == ["lake"]
+
+
+def test_a_store_of_the_first_schema_is_read(tmp_path: Path) -> None:
+    with opened(tmp_path) as store:
+        store.accept("lake", request("a"))
+        store.finish(claimed(store).revision, b"plan of a")
+        with store.database.transaction() as db:
+            db.execute("ALTER TABLE revision DROP COLUMN client")
+            db.execute(
+                "INSERT INTO revision (mission_id, revision, state, changed_s, accepted_s, fingerprint,"
+                " parameters, document) VALUES ('lake', 2, 'failed', 0, 0, 'junk', x'', x'')"
+            )
+            db.execute("PRAGMA user_version = 1")
+    with opened(tmp_path) as store:
+        [status] = store.statuses()
+        assert (status.revision, status.state) == (1, MissionState.DONE)
+        assert store.accept("lake", request("b"), "client").revision == 2
 
 
 class Walk(RuleBasedStateMachine):
@@ -164,13 +185,13 @@ class Walk(RuleBasedStateMachine):
     def __init__(self) -> None:
         super().__init__()
         self.home = Path(tempfile.mkdtemp(prefix="oxbow-store-"))
-        self.store = Store(self.home)
+        self.store = Store(Database(self.home, SCHEMA))
         self.contents: dict[str, list[str]] = {}
         self.plans: dict[Revision, bytes] = {}
         self.jobs: list[Job] = []
 
     def teardown(self) -> None:
-        self.store.close()
+        self.store.database.close()
         shutil.rmtree(self.home)
 
     @rule(mission_id=st.sampled_from(["lake", "sea"]), content=st.sampled_from("ab"))
@@ -204,8 +225,8 @@ class Walk(RuleBasedStateMachine):
 
     @rule()
     def crash(self) -> None:
-        self.store.close()
-        self.store = Store(self.home)
+        self.store.database.close()
+        self.store = Store(Database(self.home, SCHEMA))
         self.jobs.clear()
 
     @invariant()

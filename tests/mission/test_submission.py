@@ -73,9 +73,9 @@ parameters = st.builds(
     seed=st.integers(0, 2**53),
     heading_rad=st.none() | st.floats(-10, 10),
     tolerance_m=st.none() | st.floats(0, 1e6),
-    time_limit_s=st.none() | st.floats(1e-3, 1e6),
+    time_limit_s=st.none() | st.floats(1e-3, 86_400),
     id=st.none() | st.from_regex(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,127}", fullmatch=True),
-    deadline_s=st.floats(1e-3, 1e6),
+    deadline_s=st.floats(1e-3, 86_400),
 )
 
 
@@ -94,6 +94,11 @@ def test_parameters_survive_the_way_through_a_selector(given_parameters: Submiss
         ({"method": "Spiral"}, "Spiral"),
         ({"deadline_s": "0"}, "deadline_s: is 0.0"),
         ({"deadline_s": "nan"}, "deadline_s: is nan"),
+        ({"deadline_s": "inf"}, "deadline_s: is inf"),
+        ({"deadline_s": "1e308"}, r"deadline_s: is 1e\+308; expected .* at most 86400"),
+        ({"deadline_s": "3e6"}, "deadline_s: is 3000000.0; expected .* at most 86400"),
+        ({"time_limit_s": "3e6"}, "time_limit_s: is 3000000.0; expected .* at most 86400"),
+        ({"seed": "1" + 400 * "0"}, "seed"),
         ({"seed": "-1"}, "seed: is -1"),
         ({"time_limit_s": "0"}, "time_limit_s: is 0.0"),
         ({"id": "a/b"}, "id: is 'a/b'"),

@@ -43,7 +43,7 @@ from oxbow.contracts.keys import (
     mission_key,
 )
 from oxbow.contracts.message import FloatArray, Message, Place, require_area, require_finite
-from oxbow.contracts.missions import DEFAULT_DEADLINE_S, MissionState, MissionStatus
+from oxbow.contracts.missions import DEFAULT_DEADLINE_S, MOST_DEADLINE_S, MissionState, MissionStatus
 from oxbow.contracts.path import Draw, Method, PathPlan, PathRequest, SpacingStep, WeightedArea
 from oxbow.contracts.stages import ASSIGN, CERTIFY, CONTOUR, DECOMPOSE, MAX_REQUEST_BYTES, PATH, STAGES, Endpoint
 
@@ -59,6 +59,7 @@ __all__ = [
     "DEFAULT_DEADLINE_S",
     "INTROSPECTION",
     "MAX_REQUEST_BYTES",
+    "MOST_DEADLINE_S",
     "PATH",
     "PLAN_KEY",
     "PREFIX",

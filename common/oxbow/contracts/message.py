@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import msgspec
 import numpy as np
@@ -21,13 +22,21 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
     """Base of every message on the bus between Oxbow's own processes."""
 
 
-def require_finite(message: Message, *fields: str, least: float = -math.inf, above: float = -math.inf) -> None:
-    """Check numeric fields of a message: finite, at least `least`, strictly above `above`."""
+def require_finite(
+    message: Message,
+    *fields: str,
+    least: float = -math.inf,
+    above: float = -math.inf,
+    most: float = sys.float_info.max,
+) -> None:
+    """Check numeric fields of a message: finite, `least` to `most`, strictly above `above`."""
     for field in fields:
         value = getattr(message, field)
-        if value is not None and not (math.isfinite(value) and value >= least and value > above):
+        # An integer may be too large to become a float, but it compares.
+        if value is not None and not (least <= value <= most and value > above):
             accepted = f"> {above}" if above > -math.inf else f">= {least}" if least > -math.inf else "any"
-            raise InvalidMission(f"is {value!r}; expected a finite number, {accepted}", where=field)
+            bound = "" if most == sys.float_info.max else f", at most {most:g}"
+            raise InvalidMission(f"is {value!r}; expected a finite number, {accepted}{bound}", where=field)
 
 
 def require_area(message: Message, *fields: str) -> None:

@@ -7,10 +7,13 @@ import enum
 from oxbow.contracts.message import Message
 from oxbow.errors import ErrorReply
 
-__all__ = ["DEFAULT_DEADLINE_S", "MissionState", "MissionStatus"]
+__all__ = ["DEFAULT_DEADLINE_S", "MOST_DEADLINE_S", "MissionState", "MissionStatus"]
 
 DEFAULT_DEADLINE_S = 300.0
 """Seconds that planning one mission may take, its wait for a free planner not counted: twenty vehicles' worth."""
+
+MOST_DEADLINE_S = 86_400.0
+"""The most that one mission may ask for: a day."""
 
 
 class MissionState(enum.StrEnum):
@@ -33,7 +36,7 @@ class MissionStatus(Message, frozen=True, kw_only=True):
     ----------
     mission_id, revision
         Which request it is about: every new content under one id is a new revision, counted from 1. A request
-        whose id cannot be kept has revision 0.
+        that was refused has revision 0, and nothing is kept of it.
     state
         Accepted requests are on disk: each of them ends `done` or `failed`, whatever crashes.
     stage
