@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
+import sys
 import threading
 import time
 from types import FrameType
 
-__all__ = ["Lifetime"]
+__all__ = ["Lifetime", "wake_with_parents_death"]
 
 ORPHAN_GRACE_S = 2.0
 """How long a process may take to end in order once its parent is gone: nobody waits for what it still does."""
 
 _SLICE_S = 0.25
+_PR_SET_PDEATHSIG = 1
+
+
+def wake_with_parents_death() -> None:
+    """Have the death of the parent continue this process where it is stopped (SIGSTOP), on Linux.
+
+    It can then notice that death, and end. A signal that kills would not do: the kernel sends it with the end of
+    the *thread* that started this process, whose other threads may still need it.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGCONT)
 
 
 class Lifetime:
@@ -32,6 +45,7 @@ class Lifetime:
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._on_signal)
         if parent is not None:
+            wake_with_parents_death()
             threading.Thread(target=self._follow, args=(parent,), name="lifetime", daemon=True).start()
 
     def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
@@ -44,7 +58,7 @@ class Lifetime:
             time.sleep(_SLICE_S)
         self._over.set()
         time.sleep(ORPHAN_GRACE_S)
-        os._exit(1)
+        _end_at_once()
 
     def end(self) -> None:
         """End for a reason of one's own."""
@@ -59,3 +73,10 @@ class Lifetime:
         # In slices: a signal that a thread of zenoh's takes does not wake the main thread.
         while not self._over.wait(_SLICE_S):
             pass
+
+
+def _end_at_once() -> None:
+    """End, and take along what was started: a group that this process leads has nobody else in it."""
+    if os.getpgrp() == os.getpid():
+        os.killpg(0, signal.SIGKILL)
+    os._exit(1)

@@ -14,7 +14,8 @@ from pathlib import Path
 from oxbow.bus import Bus
 from oxbow.contracts import STAGES
 from oxbow.errors import InvalidMission, Unavailable
-from oxbow_cli.supervisor import Supervisor
+from oxbow_cli.health import PERIOD_S, Health
+from oxbow_cli.supervisor import Child, Supervisor
 
 __all__ = ["SERVICES", "StackSettings", "free_endpoint", "running_stack"]
 
@@ -23,6 +24,7 @@ START_S = 30.0
 
 _ATTEMPT_S = 1.0
 _LOOK_S = 0.02
+_STOPPED_S = 1.0
 _log = logging.getLogger(__name__)
 _STAGES = tuple(endpoint.stage for endpoint in STAGES)
 SERVICES = (*_STAGES, "mission", "recorder")
@@ -61,8 +63,8 @@ class StackSettings:
 def running_stack(settings: StackSettings, output: int | None = None) -> Iterator[None]:
     """A stack that is ready, for as long as the context lasts.
 
-    A process that ends is started again. All of them end with the context, or with this process
-    however it dies.
+    A process that ends, is stopped or hangs is started again. All of them end with the context, or with
+    this process however it dies.
 
     Parameters
     ----------
@@ -75,18 +77,39 @@ def running_stack(settings: StackSettings, output: int | None = None) -> Iterato
         A process ended before it was ready, or was not ready after `START_S`.
     """
     with Supervisor(output) as supervisor:
-        instances = _start(supervisor, settings)
+        started = _start(supervisor, settings)
         give_up = time.monotonic() + START_S
         with _connected(settings.endpoint, supervisor, give_up) as bus:
-            _wait_ready(bus, instances, supervisor, give_up)
+            _wait_ready(bus, started.services, supervisor, give_up)
+        watch = Health(settings.endpoint, started.router, [each.child for each in started.services])
         supervisor.keep_alive()
+        supervisor.repeat(watch.ask, PERIOD_S, "pings", at_end=watch.close)
+        supervisor.repeat(watch.look, _STOPPED_S, "stopped processes")
         yield
 
 
-def _start(supervisor: Supervisor, settings: StackSettings) -> list[tuple[str, str]]:
-    """Start everything at once, since the services wait for the router; returns each service and instance."""
+@dataclass(frozen=True)
+class _Service:
+    """A process of a service, and its name on the bus."""
+
+    service: str
+    instance: str
+    child: Child
+
+
+@dataclass(frozen=True)
+class _Started:
+    """All processes of a stack."""
+
+    router: Child
+    services: tuple[_Service, ...]
+
+
+def _start(supervisor: Supervisor, settings: StackSettings) -> _Started:
+    """Start everything at once, since the services wait for the router."""
     parent = ("--parent", str(os.getpid()))
-    supervisor.start("router", ["-m", "oxbow.bus.router", "--listen", settings.endpoint, *parent], rank=0)
+    listen = ("--listen", settings.endpoint)
+    router = supervisor.start("router", ["-m", "oxbow.bus.router", *listen, *parent], rank=0)
     own_options = {"mission": ("--home", settings.home), "recorder": ("--folder", settings.recordings)}
     started = []
     for service in SERVICES:
@@ -95,9 +118,9 @@ def _start(supervisor: Supervisor, settings: StackSettings) -> list[tuple[str, s
             options = ("--connect", settings.endpoint, "--instance", instance, *own_options.get(service, ()))
             arguments = ["-m", f"oxbow_{service}", *map(str, options), *parent]
             # The recorder outlives the stages, whose last layers it is to write.
-            supervisor.start(f"{service}-{number}", arguments, rank=1 if service == "recorder" else 2)
-            started.append((service, instance))
-    return started
+            child = supervisor.start(f"{service}-{number}", arguments, rank=1 if service == "recorder" else 2)
+            started.append(_Service(service, instance, child))
+    return _Started(router, tuple(started))
 
 
 def _connected(endpoint: str, supervisor: Supervisor, give_up: float) -> Bus:
@@ -110,9 +133,9 @@ def _connected(endpoint: str, supervisor: Supervisor, give_up: float) -> Bus:
                 raise
 
 
-def _wait_ready(bus: Bus, instances: Iterable[tuple[str, str]], supervisor: Supervisor, give_up: float) -> None:
+def _wait_ready(bus: Bus, started: Iterable[_Service], supervisor: Supervisor, give_up: float) -> None:
     """Wait for every process by its own name: another stack's would not do."""
-    while missing := [service for service, instance in instances if instance not in bus.instances(service)]:
+    while missing := [each.service for each in started if each.instance not in bus.instances(each.service)]:
         _require_alive(supervisor)
         if missing == ["recorder"] and supervisor.ended():
             _log.warning("the recorder does not start; planning goes on without recordings")

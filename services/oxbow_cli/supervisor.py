@@ -1,15 +1,20 @@
-"""Child processes: started at once, started again when they end, and stopped without a trace."""
+"""Child processes: started at once, started again when they end or do nothing, and stopped without a trace."""
 
 from __future__ import annotations
 
 import logging
+import os
+import signal
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from types import TracebackType
 from typing import Self
+
+from oxbow.errors import Unavailable
 
 __all__ = ["Child", "Supervisor"]
 
@@ -28,8 +33,8 @@ _log = logging.getLogger(__name__)
 class Child:
     """A process, and the ones that take its place when it ends.
 
-    It is no member of the terminal's process group: Ctrl-C reaches the supervisor alone, which then
-    stops its children in order.
+    It leads a session of its own, so that Ctrl-C reaches the supervisor alone, which then stops its children
+    in order; and so that whatever it has started itself can be killed with it.
 
     Parameters
     ----------
@@ -41,15 +46,25 @@ class Child:
         Its place in the order of stopping.
     output
         A file descriptor for all that it prints; where absent, this process's stderr.
+
+    Raises
+    ------
+    Unavailable
+        It cannot be started.
     """
 
     def __init__(self, name: str, arguments: Sequence[str], rank: int, output: int | None) -> None:
         self.name = name
         self.rank = rank
+        self.starts = 0
         self._command = [sys.executable, *arguments]
         self._output = sys.stderr.fileno() if output is None else output
         self._pause_s = _FIRST_PAUSE_S
-        self._start()
+        self._start_again: float | None = None
+        try:
+            self._start()
+        except OSError as error:
+            raise Unavailable(f"cannot be started: {error}", where=name) from error
 
     def _start(self) -> None:
         self.process = subprocess.Popen(
@@ -59,62 +74,122 @@ class Child:
             stderr=self._output,
             start_new_session=True,
         )
+        self.starts += 1
         self._started = time.monotonic()
-        self._start_again: float | None = None
+        self._start_again = None
+
+    @property
+    def pid(self) -> int:
+        return self.process.pid
+
+    def runs(self) -> bool:
+        return self.process.poll() is None
+
+    def age_s(self) -> float:
+        """How long ago its present process was started."""
+        return time.monotonic() - self._started
 
     def revive(self) -> None:
         """Start it again where it has ended, after a pause that doubles while it keeps ending soon."""
-        status = self.process.poll()
-        now = time.monotonic()
-        if status is None:
+        if self.runs():
             return
         if self._start_again is None:
-            if now - self._started > _SETTLED_S:
+            self.send(signal.SIGKILL)  # what it had started itself
+            if self.age_s() > _SETTLED_S:
                 self._pause_s = _FIRST_PAUSE_S
-            _log.warning("%s ended with status %d; again in %.1f s", self.name, status, self._pause_s)
-            self._start_again = now + self._pause_s
-            self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S)
-        elif now >= self._start_again:
-            self._start()
+            self._start_later(f"ended with status {self.process.returncode}")
+        elif time.monotonic() >= self._start_again:
+            try:
+                self._start()
+            except OSError as error:
+                self._start_later(f"cannot be started: {error}")
+
+    def _start_later(self, why: str) -> None:
+        _log.warning("%s %s; again in %.1f s", self.name, why, self._pause_s)
+        self._start_again = time.monotonic() + self._pause_s
+        self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S)
+
+    def replace(self, why: str) -> None:
+        """Kill it and all that it has started; `revive` starts it again."""
+        _log.warning("%s %s; it is killed", self.name, why)
+        self.send(signal.SIGKILL)
+
+    def send(self, number: signal.Signals) -> None:
+        """Send a signal to the process and those that it has started."""
+        with suppress(ProcessLookupError):
+            os.killpg(self.pid, number)
+
+    def terminate(self) -> None:
+        """Ask for an orderly end, of a process that is stopped, too."""
+        self.process.terminate()
+        self.send(signal.SIGCONT)
 
     def stop(self, grace_s: float) -> None:
-        """Wait for it to end, for no longer than `grace_s`; then kill it."""
+        """Wait for it to end, for no longer than `grace_s`; then kill it, and whatever it leaves behind."""
         try:
-            self.process.wait(grace_s)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
+            with suppress(subprocess.TimeoutExpired):
+                self.process.wait(grace_s)
+        finally:
+            self.send(signal.SIGKILL)
             self.process.wait()
 
 
 class Supervisor:
     """Runs children until it is closed; a context manager.
 
-    Children that should not outlive a supervisor that is killed have to notice its death themselves.
+    Children that should not outlive a supervisor that is killed have to notice its death themselves
+    (`oxbow.lifetime`).
     """
 
     def __init__(self, output: int | None = None) -> None:
         self.children: list[Child] = []
         self._output = output
         self._closing = threading.Event()
-        self._watch = threading.Thread(target=self._revive, name="supervisor", daemon=True)
+        self._threads: list[threading.Thread] = []
 
-    def start(self, name: str, arguments: Sequence[str], rank: int) -> None:
+    def start(self, name: str, arguments: Sequence[str], rank: int) -> Child:
         """Start a child; those of the highest rank are stopped first."""
-        self.children.append(Child(name, arguments, rank, self._output))
+        child = Child(name, arguments, rank, self._output)
+        self.children.append(child)
+        return child
 
     def ended(self) -> dict[str, int]:
         """The exit status of each child that has ended, by name."""
-        statuses = {child.name: child.process.poll() for child in self.children}
-        return {name: status for name, status in statuses.items() if status is not None}
+        return {child.name: child.process.returncode for child in self.children if not child.runs()}
 
     def keep_alive(self) -> None:
         """From now on, start children again that end."""
-        self._watch.start()
+        for child in self.children:
+            self.repeat(child.revive, _CHECK_S, child.name)
 
-    def _revive(self) -> None:
-        while not self._closing.wait(_CHECK_S):
-            for child in self.children:
-                child.revive()
+    def repeat(
+        self,
+        step: Callable[[], object],
+        period_s: float,
+        name: str,
+        at_end: Callable[[], object] = lambda: None,
+    ) -> None:
+        """Call `step` every `period_s` on a thread of its own, whatever it raises, and at last `at_end`."""
+
+        def run() -> None:
+            try:
+                self._repeat(step, period_s, name)
+            finally:
+                at_end()
+
+        thread = threading.Thread(target=run, name=name, daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+    def _repeat(self, step: Callable[[], object], period_s: float, name: str) -> None:
+        pause_s = period_s
+        while not self._closing.wait(pause_s):
+            try:
+                step()
+                pause_s = period_s
+            except Exception:  # noqa: BLE001 - whatever it was, the children still need looking after
+                pause_s = min(2 * pause_s, _LONGEST_PAUSE_S)
+                _log.exception("%s: looked after again in %.1f s", name, pause_s)
 
     def __enter__(self) -> Self:
         return self
@@ -127,12 +202,18 @@ class Supervisor:
     def close(self, grace_s: float) -> None:
         """Stop all children, those that others need to leave in order last."""
         self._closing.set()
-        if self._watch.is_alive():
-            self._watch.join()
-        for rank in sorted({child.rank for child in self.children}, reverse=True):
-            group = [child for child in self.children if child.rank == rank]
-            give_up = time.monotonic() + grace_s
-            for child in group:
-                child.process.terminate()
-            for child in group:
-                child.stop(max(0.0, give_up - time.monotonic()))
+        try:
+            for thread in self._threads:
+                thread.join()
+            for rank in sorted({child.rank for child in self.children}, reverse=True):
+                self._stop([child for child in self.children if child.rank == rank], grace_s)
+        finally:
+            for child in self.children:
+                child.stop(0.0)
+
+    def _stop(self, group: Sequence[Child], grace_s: float) -> None:
+        give_up = time.monotonic() + grace_s
+        for child in group:
+            child.terminate()
+        for child in group:
+            child.stop(max(0.0, give_up - time.monotonic()))

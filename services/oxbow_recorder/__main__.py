@@ -20,6 +20,7 @@ from oxbow.recording import Stamped
 from oxbow_recorder.address import address_of
 from oxbow_recorder.live import serve
 from oxbow_recorder.recordings import Recordings
+from oxbow_recorder.vitals import answer_introspection
 
 _log = logging.getLogger("oxbow_recorder")
 
@@ -51,6 +52,7 @@ def main(argv: list[str] | None = None) -> None:
     if session is not None:
         with session:
             subscription = session.subscribe(ANY_LAYER, record, queue_size=QUEUE)
+            answer_introspection(session, options.instance, recordings.counts)
             session.declare_live(live_key("recorder", options.instance))
             lifetime.wait()
             subscription.close()

@@ -15,6 +15,7 @@ from oxbow_recorder.address import Run
 from oxbow_recorder.blueprint import blueprint
 from oxbow_recorder.drawing import draw
 from oxbow_recorder.files import part_path, recording_path, sweep
+from oxbow_recorder.vitals import Counts
 
 __all__ = ["Recording", "Recordings"]
 
@@ -84,6 +85,7 @@ class Recordings:
         self.live = live
         self._clock = clock
         self._open: dict[Run, Recording] = {}
+        self._finished = 0
         folder.mkdir(parents=True, exist_ok=True)
         sweep(folder)
 
@@ -97,6 +99,9 @@ class Recordings:
             self._close(run)
         self._close_idle()
 
+    def counts(self) -> Counts:
+        return Counts(finished=self._finished, open=len(self._open))
+
     def close(self) -> None:
         """Finish every file."""
         for run in list(self._open):
@@ -108,4 +113,5 @@ class Recordings:
                 self._close(run)
 
     def _close(self, run: Run) -> None:
+        self._finished += 1
         _log.info("wrote %s", self._open.pop(run).close())

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 import psutil
 import pytest
 
+from oxbow import Client
 from oxbow_cli.stack import SERVICES, free_endpoint
 
 pytestmark = pytest.mark.processes
@@ -163,6 +164,35 @@ def test_a_stack_that_is_up(start, oxbow):
     assert child(up, "oxbow_decomposition").pid != killed.pid
 
     processes = family(up)
+    for process in processes[::2]:
+        process.suspend()
     up.send_signal(signal.SIGINT)
     assert up.wait(GONE_S) == 0
     until(lambda: not running(processes), GONE_S)
+
+
+def test_what_freezes_is_replaced_and_missions_are_planned_all_the_same(start):
+    endpoint = free_endpoint()
+    up = start("up", "--listen", endpoint)
+    assert up.stdout.readline() == f"ready: {endpoint}\n"
+    for number, modules in enumerate((("oxbow_contour", "oxbow_recorder"), ("oxbow_mission", "oxbow.bus.router"))):
+        frozen = [child(up, module) for module in modules]
+        frozen += [one for process in frozen for one in process.children()]
+        plan = start("plan", "pond.json", "--connect", endpoint, "--seed", str(number))
+        wait_for_missions(endpoint, number + 1)
+        for process in frozen:
+            process.suspend()
+        assert plan.wait(60) == 0
+        assert not running(frozen)
+
+    processes = family(up)
+    for process in processes[::2]:
+        process.suspend()
+    up.kill()
+    until(lambda: not running(processes), GONE_S)
+
+
+def wait_for_missions(endpoint: str, count: int) -> None:
+    """Wait until so many missions have been accepted."""
+    with Client(endpoint) as client:
+        until(lambda: len(client.statuses()) >= count)

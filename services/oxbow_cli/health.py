@@ -1,0 +1,193 @@
+"""Finds processes that are there and do nothing: stopped ones, and ones that answer no ping.
+
+A process that hangs may well keep its token on the bus, so that callers go on asking it: it has to be killed.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from oxbow.bus import Session
+from oxbow.closing import Closing
+from oxbow.contracts import any_introspection_key
+from oxbow.errors import DeadlineExceeded, Unavailable
+from oxbow.introspection import Ping
+from oxbow_cli.supervisor import Child
+
+__all__ = ["Health", "StoppedProcess", "stopped_processes"]
+
+PERIOD_S = 0.5
+"""How long after one round of pings the next begins."""
+
+ANSWER_S = 1.5
+"""How long a round waits for answers."""
+
+SILENT_S = 3.5
+"""How long a process may answer nothing: one that answers pings does little else."""
+
+BUSY_S = 20.0
+"""The same for one that uses the processor: a long computation is no reason to lose what it computes."""
+
+START_S = 30.0
+"""How long a process may take to answer its first ping."""
+
+_BUSY_SHARE = 0.1
+"""A process that uses less of a processor than this does nothing."""
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class _Silence:
+    """How long a process has been silent, and the processor time that it had used when that began."""
+
+    lasted_s: float
+    used_before_s: float
+
+
+class Health(Closing):
+    """Watches over the processes of a stack.
+
+    Parameters
+    ----------
+    endpoint
+        The bus that the processes are on.
+    router
+        What routes: it answers no pings, but everything is deaf without it.
+    services
+        What answers pings.
+
+    Attributes
+    ----------
+    answering
+        Process ids of what answered the last pings.
+    """
+
+    def __init__(self, endpoint: str, router: Child, services: Sequence[Child]) -> None:
+        self._endpoint = endpoint
+        self._session: Session | None = None
+        self._router = router
+        self._services = services
+        self.answering: frozenset[int] = frozenset()
+        self._known: set[int] = set()
+        self._silences: dict[int, _Silence] = {}
+        self._asked_at = time.monotonic()
+
+    def close(self) -> None:
+        """Leave the bus, until something is asked again."""
+        if self._session is not None:
+            self._session.close()
+            self._session = None
+
+    def ask(self) -> None:
+        """Ping everything; replace what has been silent for too long."""
+        asked = {child.pid: child for child in self._services if child.runs()}
+        answered = self._answered()
+        self.answering = frozenset(answered or ())
+        if answered is None:
+            silent = {self._router.pid: self._router}
+        else:
+            self._known = (self._known | answered) & asked.keys()
+            silent = {
+                pid: child
+                for pid, child in asked.items()
+                if pid not in answered and (pid in self._known or child.age_s() > START_S)
+            }
+        self._note(silent)
+        for pid, child in silent.items():
+            if self._is_hung(pid) and child.pid == pid:
+                child.replace(f"has answered nothing for {self._silences[pid].lasted_s:.1f} s")
+
+    def _answered(self) -> set[int] | None:
+        """The process ids of all that answer; None where the router does not let one ask."""
+        if self._session is not None and (answered := _pings(self._session)):
+            return answered
+        # A session may not have noticed yet that its router is gone, or may be what is at fault.
+        self.close()
+        try:
+            self._session = Session.connect(self._endpoint, timeout_s=ANSWER_S)
+        except Unavailable:
+            return None
+        return _pings(self._session)
+
+    def _note(self, silent: dict[int, Child]) -> None:
+        """Add this round to the silences; time in which nothing was asked does not count."""
+        now = time.monotonic()
+        round_s = min(now - self._asked_at, PERIOD_S + ANSWER_S)
+        self._asked_at = now
+        begun = {pid: _Silence(0.0, _used_s(pid)) for pid in silent} | self._silences
+        self._silences = {pid: _Silence(begun[pid].lasted_s + round_s, begun[pid].used_before_s) for pid in silent}
+
+    def _is_hung(self, pid: int) -> bool:
+        silence = self._silences[pid]
+        used_s = _used_s(pid) - silence.used_before_s
+        is_busy = used_s > _BUSY_SHARE * silence.lasted_s
+        return silence.lasted_s >= (BUSY_S if is_busy else SILENT_S)
+
+    def look(self) -> None:
+        """Kill what is stopped, as by SIGSTOP: a child, or a process that one has started.
+
+        No terminal stops them, since their sessions have none; one that a debugger holds is not taken for stopped.
+        """
+        leaders = {child.pid: child for child in (self._router, *self._services)}
+        for each in stopped_processes():
+            if each.session in leaders:
+                _kill(each, leaders[each.session])
+
+
+def _pings(session: Session) -> set[int]:
+    """The process ids of all that answer."""
+    key = any_introspection_key("ping")
+    try:
+        replies = session.query(key, timeout_s=ANSWER_S, all_targets=True, may_be_empty=True)
+    except (DeadlineExceeded, Unavailable):
+        return set()
+    return {msgspec.json.decode(payload, type=Ping).pid for _key, payload in replies}
+
+
+def _kill(stopped: StoppedProcess, leader: Child) -> None:
+    if stopped.pid == leader.pid:
+        leader.replace("is stopped")
+        return
+    _log.warning("%s: process %d of it is stopped; it is killed", leader.name, stopped.pid)
+    with suppress(ProcessLookupError):
+        os.kill(stopped.pid, signal.SIGKILL)
+
+
+@dataclass(frozen=True)
+class StoppedProcess:
+    """A process that is stopped, and the session that it belongs to."""
+
+    pid: int
+    session: int
+
+
+def stopped_processes() -> Iterator[StoppedProcess]:
+    """All stopped processes of this machine, where there is a ``/proc`` that tells."""
+    for file in Path("/proc").glob("[0-9]*/stat"):
+        fields = _fields(file)
+        if fields and fields[0] == "T":
+            yield StoppedProcess(pid=int(file.parent.name), session=int(fields[3]))
+
+
+def _used_s(pid: int) -> float:
+    """Processor time that a process has used; 0 where the system does not tell."""
+    fields = _fields(Path(f"/proc/{pid}/stat"))
+    return sum(map(int, fields[11:13])) / os.sysconf("SC_CLK_TCK")
+
+
+def _fields(stat: Path) -> list[str]:
+    """What follows the name in ``/proc/PID/stat``: state, parent, group, session, ...; nothing once it is gone."""
+    try:
+        return stat.read_text().rpartition(")")[2].split()
+    except OSError:
+        return []
