@@ -55,7 +55,7 @@ from oxbow.contracts import (
     layer_key,
     live_key,
 )
-from oxbow.envelope import Envelope
+from oxbow.envelope import Envelope, StageError
 from oxbow.errors import ErrorCode, ErrorReply
 from oxbow.ids import MOST_ID_CHARACTERS
 from oxbow.introspection import Info, Ping, Stats
@@ -149,8 +149,13 @@ def _missions() -> Iterator[str]:
 
 
 def _stages() -> Iterator[str]:
-    yield "A request to a stage travels with an `Envelope` (JSON) as the query's attachment.\n"
+    yield (
+        "A request to a stage travels with an `Envelope` (JSON) as the query's attachment. A reply has the"
+        " request's id attached, an error carries it as a `StageError`: nothing else is an answer. Another"
+        " request under the same id is refused. A key below an instance's that is none is answered by an error.\n"
+    )
     yield _message(Envelope)
+    yield _message(StageError)
     seen: set[type] = set()
     for endpoint in STAGES:
         yield f"### Stage `{endpoint.stage}`\n"

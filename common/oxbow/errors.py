@@ -7,6 +7,7 @@ be accepted, and `where`: the field, vertex or stage it came from.
 from __future__ import annotations
 
 import enum
+import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import ClassVar
@@ -23,6 +24,7 @@ __all__ = [
     "InvalidMission",
     "OxbowError",
     "Unavailable",
+    "described",
     "renamed",
 ]
 
@@ -50,6 +52,11 @@ class OxbowError(Exception):
 
     def __str__(self) -> str:
         return f"{self.where}: {self.message}" if self.where else self.message
+
+
+def described(error: BaseException) -> str:
+    """Kind and text of an exception that nobody expected, also of one that cannot be turned into text."""
+    return "".join(traceback.format_exception_only(error)).strip()
 
 
 @contextmanager
@@ -102,6 +109,10 @@ BY_CODE: dict[ErrorCode, type[OxbowError]] = {
 }
 
 
+MOST_TEXT = 10_000
+"""Characters of an error's message that travel."""
+
+
 class ErrorReply(msgspec.Struct, frozen=True, kw_only=True):
     """An error as it travels on the bus (JSON)."""
 
@@ -111,8 +122,15 @@ class ErrorReply(msgspec.Struct, frozen=True, kw_only=True):
 
     @classmethod
     def of(cls, error: OxbowError) -> ErrorReply:
-        return cls(code=error.code, message=error.message, where=error.where)
+        """An error in a form that can be sent, whatever text it quotes."""
+        return cls(code=error.code, message=_sendable(error.message), where=_sendable(error.where))
 
     def error(self) -> OxbowError:
         """The exception to raise at the caller's side."""
         return BY_CODE[self.code](self.message, self.where)
+
+
+def _sendable(text: str) -> str:
+    """`text` without what is no Unicode, cut off where it is too long to be read."""
+    shown = text if len(text) <= MOST_TEXT else f"{text[:MOST_TEXT]}... ({len(text)} characters)"
+    return shown.encode(errors="replace").decode()

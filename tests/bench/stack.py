@@ -218,4 +218,4 @@ def _name(process: psutil.Process) -> str:
     """The module that runs; a worker by its handler."""
     command = process.cmdline()
     module = command[command.index("-m") + 1] if "-m" in command else process.name()
-    return f"{command[-2].partition('.')[0]} worker" if module == "oxbow.stage.process" else module
+    return f"{command[-3].partition('.')[0]} worker" if module == "oxbow.stage.process" else module

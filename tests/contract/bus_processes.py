@@ -17,11 +17,12 @@ __all__ = ["Replica", "end", "launch", "run_python", "wait_gone", "wait_until"]
 Replica = subprocess.Popen[bytes]
 
 
-def launch(endpoint: str, instance: str, *options: str) -> Replica:
+def launch(endpoint: str, instance: str, *options: str, stderr: int | None = None) -> Replica:
     """Start a replica of the echo stage."""
     options = ("--parent", str(os.getpid()), *options)
     return subprocess.Popen(
         [sys.executable, "-m", "echo_stage", "--connect", endpoint, "--instance", instance, *options],
+        stderr=stderr,
         env=_environment(),
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import time
 import uuid
 from collections.abc import Callable
@@ -20,8 +21,9 @@ from oxbow import codec
 from oxbow.bus import Bus, BusCall, Envelope
 from oxbow.bus.router import RouterProcess
 from oxbow.contracts import INTROSPECTION, MAX_REQUEST_BYTES, any_introspection_key
-from oxbow.errors import Busy, DeadlineExceeded, Internal, InvalidMission, OxbowError, Unavailable
+from oxbow.errors import Busy, DeadlineExceeded, Infeasible, Internal, InvalidMission, OxbowError, Unavailable
 from oxbow.introspection import Info, Ping, Stats
+from oxbow.stage import serve_stage
 
 pytestmark = pytest.mark.processes
 
@@ -209,10 +211,91 @@ def test_what_is_too_large_is_refused_by_size(start_replicas: StartReplicas, cal
         call(ECHO, EchoRequest(shape=SQUARE, deed=Deed.BLOAT))
 
 
-def test_a_query_without_an_envelope_is_refused(start_replicas: StartReplicas, bus: Bus) -> None:
+ODD_ATTACHMENTS = [
+    (b"", "attachment: is not JSON"),
+    (b"\xff\xfe", "attachment: is not JSON"),
+    (b'{"request_id":"\xff","deadline_s":1}', "attachment: is not JSON: a string is not UTF-8"),
+    (b'{"a":' * 10_000, "attachment: is nested too deeply"),
+    (b'{"request_id":"a/b","deadline_s":1}', "request_id: is 'a/b'"),
+    (b'{"request_id":"r","deadline_s":1e300}', r"deadline_s: is 1e\+300; expected Unix time"),
+    (b'{"request_id":"r","deadline_s":1,"mission_id":"@m"}', "mission_id: is '@m'"),
+    (b'{"request_id":"r","deadline_s":1,"origin":[1e300,0]}', r"origin: is \(1e\+300, 0"),
+    (b'{"request_id":"r","deadline_s":1,"part":"%s"}' % (b"p" * 200), r"part: is 'p+'\.\.\. \(200 characters\)"),
+]
+
+
+def test_every_query_has_an_answer(start_replicas: StartReplicas, bus: Bus) -> None:
     start_replicas()
-    with pytest.raises(InvalidMission, match="attachment: is no Envelope"):
-        bus.query(ECHO.instance_key("r0"), codec.encode(EchoRequest(shape=SQUARE)), timeout_s=5.0)
+    for attachment, message in ODD_ATTACHMENTS:
+        with pytest.raises(InvalidMission, match=message):
+            bus.query(ECHO.instance_key("r0"), b"garbage", timeout_s=5.0, attachment=attachment)
+
+
+def test_a_key_that_is_none_is_answered_by_those_that_are(start_replicas: StartReplicas, bus: Bus) -> None:
+    start_replicas()
+    key = ECHO.instance_key("r0")
+    for unknown in ("ping", "a/b"):
+        with pytest.raises(InvalidMission, match=rf"key: is '{key}/{unknown}'; expected {key}, {key}/@ping"):
+            bus.query(f"{key}/{unknown}", timeout_s=5.0)
+
+
+def test_another_request_under_an_id_that_is_taken_gets_no_answer_of_it(
+    start_replicas: StartReplicas, bus: Bus
+) -> None:
+    start_replicas()
+    same = envelope()
+    with ThreadPoolExecutor(1) as pool:
+        first = pool.submit(ask, bus, EchoRequest(text="first", shape=SQUARE, seconds=0.5), same)
+        time.sleep(0.2)
+        while_at_work = ask(bus, EchoRequest(text="second", shape=SQUARE), same)
+        assert isinstance(first.result(), bytes)
+    afterwards = ask(bus, EchoRequest(text="third", shape=SQUARE), same)
+    for refused in (while_at_work, afterwards):
+        assert isinstance(refused, InvalidMission)
+        assert "the id of another request" in refused.message
+
+
+def test_a_frozen_worker_costs_a_request_seconds_and_not_its_deadline(
+    start_replicas: StartReplicas, bus: Bus, tmp_path: Path
+) -> None:
+    start_replicas()
+    request = EchoRequest(text="thawed", shape=SQUARE, deed=Deed.FREEZE_ONCE, path=str(tmp_path / "frozen"))
+    started = time.monotonic()
+    assert bus.call(ECHO, request, envelope(60.0)).text == "thawed"
+    assert time.monotonic() - started < 20.0
+    assert stats(bus).worker_restarts == 1
+
+
+def test_a_stopped_worker_ends_with_its_session_process(start_replicas: StartReplicas) -> None:
+    [replica] = start_replicas()
+    worker = psutil.Process(replica.pid).children()[0]
+    worker.suspend()
+    wait_until(lambda: worker.status() == psutil.STATUS_STOPPED)
+    replica.kill()
+    wait_gone(worker.pid)
+
+
+def test_too_little_memory_is_said_and_costs_no_worker(start_replicas: StartReplicas, bus: Bus) -> None:
+    start_replicas(1, "--memory-mb", "500")
+    with pytest.raises(Infeasible, match="echo: needs more than the 500 MB of memory"):
+        bus.call(ECHO, EchoRequest(shape=SQUARE, deed=Deed.HUNGER), envelope())
+    assert stats(bus).worker_restarts == 0
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ("--instance=@x", "id: is '@x'"),
+        ("--queue=0", "--queue: is '0'; expected a whole number from 1"),
+        ("--memory-mb=9", "--memory-mb: is '9'; expected a whole number from 256"),
+    ],
+)
+def test_an_option_that_cannot_be_is_refused_by_name(
+    option: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        serve_stage("echo_stage:ECHO", "echo_stage:handle", [option])
+    assert message in capsys.readouterr().err
 
 
 def test_the_worker_ends_with_its_session_process_even_in_the_middle_of_work(
@@ -259,9 +342,11 @@ def test_a_handler_that_cannot_be_imported_ends_the_replica(router: RouterProces
 
 
 def test_a_replica_waits_for_its_router_and_ends_when_told() -> None:
-    replica = launch("tcp/127.0.0.1:9", "early")
+    replica = launch("tcp/127.0.0.1:9", "early", stderr=subprocess.PIPE)
+    assert replica.stderr is not None
     try:
-        time.sleep(0.5)
+        with replica.stderr:
+            assert b"waiting for it" in replica.stderr.readline()
         assert replica.poll() is None
         replica.terminate()
         assert replica.wait(10.0) == 0

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from concurrent.futures import Executor, ThreadPoolExecutor
 from typing import Any
 
 from mission_files import BROKEN_SEED, INFEASIBLE_SEED
 from shapely import LineString
 
 from oxbow import codec
-from oxbow.bus import Session
+from oxbow.bus import Envelope, Session
+from oxbow.bus.query import MSGPACK, Query
 from oxbow.contracts import (
     ASSIGN,
     CERTIFY,
@@ -32,7 +34,8 @@ from oxbow.contracts import (
     PathRequest,
     Sortie,
 )
-from oxbow.errors import Infeasible
+from oxbow.envelope import StageError
+from oxbow.errors import ErrorReply, Infeasible, Internal, OxbowError, described
 from oxbow.lifetime import Lifetime
 
 
@@ -89,11 +92,22 @@ def certify(request: CertifyRequest) -> Certificate:
     )
 
 
-def answering(kind: type[Message], handle: Callable[[Any], Message]) -> Callable[..., Iterator[tuple[str, bytes]]]:
-    def on_query(key: str, _parameters: dict[str, str], payload: bytes) -> Iterator[tuple[str, bytes]]:
-        yield key, codec.encode(handle(codec.decode(payload, kind)))
+def answering(
+    endpoint: Endpoint[Any, Any], handle: Callable[[Any], Message], pool: Executor
+) -> Callable[[Query], object]:
+    key = endpoint.instance_key("trivial")
 
-    return on_query
+    def answer(query: Query) -> None:
+        request_id = Envelope.decode(query.attachment).request_id
+        with query:
+            try:
+                reply = codec.encode(handle(codec.decode(query.payload, endpoint.request)))
+                query.reply(key, reply, encoding=MSGPACK, attachment=request_id.encode())
+            except Exception as error:  # noqa: BLE001 - as a stage does
+                known = error if isinstance(error, OxbowError) else Internal(described(error), where=key)
+                query.fail(StageError.about(request_id, ErrorReply.of(known)))
+
+    return lambda query: pool.submit(answer, query)
 
 
 HANDLERS: tuple[tuple[Endpoint[Any, Any], Callable[[Any], Message]], ...] = (
@@ -111,9 +125,9 @@ def main() -> None:
     parser.add_argument("--parent", type=int)
     options = parser.parse_args()
     lifetime = Lifetime(options.parent)
-    with Session.connect(options.connect) as session:
+    with ThreadPoolExecutor(4) as pool, Session.connect(options.connect) as session:
         for endpoint, handle in HANDLERS:
-            session.answer(endpoint.instance_key("trivial"), answering(endpoint.request, handle), workers=4)
+            session.declare_queryable(endpoint.instance_key("trivial"), answering(endpoint, handle, pool))
             session.declare_live(endpoint.live_key("trivial"))
         lifetime.wait()
 

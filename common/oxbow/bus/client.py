@@ -5,17 +5,18 @@ from __future__ import annotations
 import time
 import uuid
 from collections.abc import Iterable
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 import msgspec
 import zenoh
 
 from oxbow import codec
 from oxbow.bus.replicas import Replicas
-from oxbow.bus.session import Session, error_of
+from oxbow.bus.session import Session, error_of, is_timeout, told_error
 from oxbow.contracts import ANY_LIVE, MAX_REQUEST_BYTES, Endpoint, Message, live_service
 from oxbow.envelope import Envelope
-from oxbow.errors import Busy, DeadlineExceeded, Internal, InvalidMission, Unavailable
+from oxbow.errors import Busy, DeadlineExceeded, ErrorCode, Internal, InvalidMission, OxbowError, Unavailable
+from oxbow.ids import MOST_ID_CHARACTERS
 
 __all__ = ["Bus", "BusCall"]
 
@@ -25,9 +26,10 @@ R = TypeVar("R", bound=Message)
 MOST_OUTSTANDING = 4
 """Requests of one caller that one replica may hold: enough to keep it at work, few enough to share well."""
 
-MOST_WORKER_LOSSES = 3
-"""Worker processes that one request may cost before it is taken to be what kills them."""
+MOST_FAILURES = 3
+"""Worker processes that one request may cost, or wrong answers that it may get, before it is given up."""
 
+WRONG = "wrong answer"
 LOOK_ROUND_S = 0.5
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.02, 0.5
 REPLY_GRACE_S = 0.5
@@ -83,15 +85,14 @@ class Bus(Session):
         DeadlineExceeded
             No answer before the envelope's deadline.
         Internal
-            The request has cost the stage `MOST_WORKER_LOSSES` worker processes.
+            `MOST_FAILURES` times, the request cost a worker process, or got what is no answer to it.
         OxbowError
             Whatever the stage itself raised.
         """
         payload = codec.encode(request)
         if len(payload) > MAX_REQUEST_BYTES:
             raise InvalidMission(f"is {len(payload)} bytes; at most {MAX_REQUEST_BYTES}", where=endpoint.stage)
-        reply = _Attempts(self, endpoint, payload, envelope).run()
-        return codec.decode(reply, endpoint.reply)
+        return _Attempts(self, endpoint, payload, envelope).run()
 
 
 class BusCall:
@@ -130,11 +131,15 @@ class _Lost(Unavailable):
     """Nothing came back: the replica went away with the request, or before it."""
 
 
-class _WorkerLost(Unavailable):
-    """The replica is there, but its worker process died with the request."""
+class _Failed(Unavailable):
+    """The replica is there, but has not answered: its worker process died with the request, or it said else."""
+
+    def __init__(self, message: str, outcome: str) -> None:
+        super().__init__(message)
+        self.outcome = outcome
 
 
-class _Attempts:
+class _Attempts(Generic[Q, R]):
     """The attempts at one request, and what became of them."""
 
     def __init__(self, bus: Bus, endpoint: Endpoint[Q, R], payload: bytes, envelope: Envelope) -> None:
@@ -146,10 +151,10 @@ class _Attempts:
         self.started = time.monotonic()
         self.tried: dict[str, str] = {}
         self.to_avoid: set[str] = set()
-        self.worker_losses = 0
+        self.failures = 0
         self.pause_s = FIRST_PAUSE_S
 
-    def run(self) -> bytes:
+    def run(self) -> R:
         replicas, stage = self.bus.replicas, self.endpoint.stage
         while True:
             instance = self._next_instance()
@@ -159,8 +164,8 @@ class _Attempts:
                 self._note(instance, "lost")
             except Busy:
                 self._note(instance, "busy")
-            except _WorkerLost as error:
-                self._note_worker_loss(instance, error)
+            except _Failed as error:
+                self._note_failure(instance, error)
             finally:
                 replicas.release(stage, instance)
             self._pause()
@@ -175,25 +180,47 @@ class _Attempts:
                 raise Unavailable(f"has no live replica at {self.bus.endpoint}, {self._history()}", where=stage)
         raise DeadlineExceeded(f"no answer {self._history()}", where=stage)
 
-    def _ask(self, instance: str) -> bytes:
+    def _ask(self, instance: str) -> R:
         key = self.endpoint.instance_key(instance)
         timeout_s = max(0.0, self.envelope.remaining_s()) + REPLY_GRACE_S
         for reply in self.bus._get(key, self.payload, attachment=self.attachment, timeout_s=timeout_s):
             if reply.ok is not None:
-                return reply.ok.payload.to_bytes()
+                return self._answer(reply.ok, key)
             if reply.err is not None:
-                error = error_of(reply.err, key, timeout_s)
-                raise _WorkerLost(error.message) if isinstance(error, Unavailable) else error
+                raise self._error(reply.err, key, timeout_s)
         raise _Lost("nothing came back")
+
+    def _answer(self, sample: zenoh.Sample, key: str) -> R:
+        """A reply, if it is one to this request."""
+        about = b"" if sample.attachment is None else sample.attachment.to_bytes()
+        if str(sample.key_expr) != key or about != self.envelope.request_id.encode():
+            whose = f"under {str(sample.key_expr)!r} to request {about[:MOST_ID_CHARACTERS]!r}"
+            raise _Failed(f"{key} replied {whose}, not to {self.envelope.request_id!r}", WRONG)
+        try:
+            return codec.decode(sample.payload.to_bytes(), self.endpoint.reply)
+        except InvalidMission as error:
+            raise _Failed(f"{key} replied what is no answer: {error}", WRONG) from error
+
+    def _error(self, reply: zenoh.ReplyError, key: str, timeout_s: float) -> OxbowError:
+        """The exception to raise for an error reply, if it is one to this request."""
+        if is_timeout(reply):
+            return error_of(reply, key, timeout_s)
+        told = told_error(reply, key)
+        if told.request_id != self.envelope.request_id:
+            whose = f"an error to request {told.request_id[:MOST_ID_CHARACTERS]!r}"
+            return _Failed(f"{key} replied {whose}, not to {self.envelope.request_id!r}: {told.message}", WRONG)
+        if told.code is ErrorCode.UNAVAILABLE:
+            return _Failed(told.message, "worker lost")
+        return told.error()
 
     def _note(self, instance: str, outcome: str) -> None:
         self.tried[instance] = outcome
         self.to_avoid.add(instance)
 
-    def _note_worker_loss(self, instance: str, error: _WorkerLost) -> None:
-        self._note(instance, "worker lost")
-        self.worker_losses += 1
-        if self.worker_losses >= MOST_WORKER_LOSSES:
+    def _note_failure(self, instance: str, error: _Failed) -> None:
+        self._note(instance, error.outcome)
+        self.failures += 1
+        if self.failures >= MOST_FAILURES:
             raise Internal(f"{error.message}; given up {self._history()}", where=self.endpoint.stage) from error
 
     def _pause(self) -> None:

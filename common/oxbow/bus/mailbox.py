@@ -69,5 +69,5 @@ class Mailbox(Generic[T]):
         while (item := self._items.get()) is not None:
             try:
                 self._deliver(item)
-            except Exception:  # noqa: BLE001 - the adapter at which an item's failure ends
+            except BaseException:  # noqa: BLE001 - the adapter at which an item's failure ends
                 _log.exception("%s: an item was lost", self.name)

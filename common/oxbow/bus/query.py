@@ -46,9 +46,9 @@ class Query:
     def attachment(self) -> bytes:
         return b"" if self._query.attachment is None else self._query.attachment.to_bytes()
 
-    def reply(self, key: str, payload: bytes, *, encoding: str = JSON) -> None:
+    def reply(self, key: str, payload: bytes, *, encoding: str = JSON, attachment: bytes | None = None) -> None:
         """Give one reply; `key` must match the one that is asked."""
-        self._query.reply(key, payload, encoding=encoding)
+        self._query.reply(key, payload, encoding=encoding, attachment=attachment)
 
     def fail(self, error: ErrorReply) -> None:
         """Reply an error; its JSON encoding tells it from zenoh's own."""

@@ -13,7 +13,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from typing import Self
 
-import msgspec
 import zenoh
 from zenoh.handlers import Callback
 
@@ -22,9 +21,26 @@ from oxbow.bus.mailbox import Mailbox
 from oxbow.bus.query import JSON, Query
 from oxbow.bus.subscription import Audience, Declared, OnQuery, OnSample, Subscription
 from oxbow.closing import Closing
-from oxbow.errors import Busy, DeadlineExceeded, ErrorReply, Internal, OxbowError, Unavailable
+from oxbow.envelope import StageError
+from oxbow.errors import (
+    Busy,
+    DeadlineExceeded,
+    ErrorCode,
+    ErrorReply,
+    Internal,
+    InvalidMission,
+    OxbowError,
+    Unavailable,
+    described,
+)
+from oxbow.ids import excerpt
+from oxbow.strict_json import decode_json
+from oxbow.waits import checked_wait
 
-__all__ = ["Session", "error_of"]
+__all__ = ["MOST_KEY_BYTES", "Session", "error_of", "is_timeout", "told_error"]
+
+MOST_KEY_BYTES = 4096
+"""An id of 128 characters, percent-encoded and with all that stands around it, is far shorter."""
 
 OPEN_ATTEMPT_S = 1.0
 LINK_LOSS_S = 0.1
@@ -115,8 +131,11 @@ class Session(Closing):
         ------
         Unavailable
             The session is closed.
+        InvalidMission
+            The key is none.
         """
         priority = zenoh.Priority.INTERACTIVE_HIGH if urgent else zenoh.Priority.DATA
+        require_key(key)
         try:
             self._session.put(
                 key,
@@ -143,6 +162,7 @@ class Session(Closing):
             if not mailbox.offer(sample):
                 _log.warning("%s: the queue of %d is full; a sample is lost", sample.key_expr, queue_size)
 
+        require_key(key_expr)
         declared = self._session.declare_subscriber(key_expr, Callback(accept, indirect=False))
         return self._keep(Subscription([declared], mailbox))
 
@@ -163,10 +183,8 @@ class Session(Closing):
                         query.reply(key, reply)
                 except OxbowError as error:
                     query.fail(ErrorReply.of(error))
-                except Exception as error:  # noqa: BLE001 - becomes an `internal` reply
-                    _log.exception("%s: no answer", query.key)
-                    fault = Internal(f"{type(error).__name__}: {error}", where=keys[0])
-                    query.fail(ErrorReply.of(fault))
+                except BaseException as error:  # noqa: BLE001 - becomes an `internal` reply
+                    _fail(query, error, keys[0])
 
         mailbox = Mailbox[Query](f"answer {keys[0]}", deliver, size=queue_size, workers=workers)
 
@@ -179,10 +197,19 @@ class Session(Closing):
         return self._keep(Subscription([self.declare_queryable(key, accept) for key in keys], mailbox))
 
     def declare_queryable(self, key: str, accept: Callable[[Query], None]) -> Declared:
-        """Receive queries on the network thread: `accept` must hand them on at once."""
+        """Receive queries on the network thread: `accept` must hand them on at once.
 
-        def wrap(query: zenoh.Query) -> None:
-            accept(Query(query))
+        Where it raises, the query is answered `internal`.
+        """
+        require_key(key)
+
+        def wrap(zenoh_query: zenoh.Query) -> None:
+            query = Query(zenoh_query)
+            try:
+                accept(query)
+            except BaseException as error:  # noqa: BLE001 - zenoh would drop the query without a word
+                with query:
+                    _fail(query, error, key)
 
         return self._session.declare_queryable(key, Callback(wrap, indirect=False))
 
@@ -212,7 +239,8 @@ class Session(Closing):
         Raises
         ------
         OxbowError
-            The error that was replied; `DeadlineExceeded` after `timeout_s`; `Unavailable` where nobody answered.
+            The error that was replied; `DeadlineExceeded` after `timeout_s`; `Unavailable` where nobody answered;
+            `InvalidMission` where the selector is none, or `timeout_s` is no wait (`oxbow.waits`).
         """
         found: list[tuple[str, bytes]] = []
         failure: OxbowError | None = None
@@ -231,10 +259,12 @@ class Session(Closing):
 
     def audience(self, key_expr: str) -> Audience:
         """Watch whether anyone subscribes to keys that match `key_expr`."""
+        require_key(key_expr)
         return Audience(self._session.declare_publisher(key_expr))
 
     def declare_live(self, key: str) -> None:
         """Be seen alive under `key` until `undeclare_live`, `close`, or the death of this process."""
+        require_key(key)
         self._tokens[key] = self._session.liveliness().declare_token(key)
 
     def undeclare_live(self, key: str) -> None:
@@ -245,7 +275,10 @@ class Session(Closing):
         """Call `on_change(key, alive)` for every token now and later; on the network thread, so briefly."""
 
         def accept(sample: zenoh.Sample) -> None:
-            on_change(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+            try:
+                on_change(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+            except Exception:  # noqa: BLE001 - one token that is not understood must not hide the others
+                _log.exception("%s: not understood", sample.key_expr)
 
         self._session.liveliness().declare_subscriber(key_expr, Callback(accept, indirect=False), history=True)
 
@@ -258,6 +291,8 @@ class Session(Closing):
         all_targets: bool = False,
         attachment: bytes | None = None,
     ) -> Iterator[zenoh.Reply]:
+        require_key(selector.partition("?")[0])
+        checked_wait(timeout_s, "timeout_s")
         target = zenoh.QueryTarget.ALL if all_targets else zenoh.QueryTarget.BEST_MATCHING
         cancellation = zenoh.CancellationToken()
         self._asking.add(cancellation)
@@ -294,9 +329,44 @@ class Session(Closing):
         return subscription
 
 
+def require_key(key: str) -> None:
+    """Refuse a key that zenoh would panic at, and with which it would take the whole session.
+
+    Raises
+    ------
+    InvalidMission
+        It is longer than `MOST_KEY_BYTES`, or no Unicode.
+    """
+    size = len(key.encode(errors="surrogatepass"))
+    if size > MOST_KEY_BYTES or any("\ud800" <= character <= "\udfff" for character in key):
+        raise InvalidMission(
+            f"is {excerpt(key)}, {size} bytes; expected at most {MOST_KEY_BYTES} bytes of Unicode", where="key"
+        )
+
+
 def error_of(reply: zenoh.ReplyError, selector: str, timeout_s: float) -> OxbowError:
     """The exception that an error reply stands for."""
-    if str(reply.encoding) == JSON:
-        return msgspec.json.decode(reply.payload.to_bytes(), type=ErrorReply).error()
-    # Zenoh's own error replies are plain text, and the only one that reaches a caller is its time-out.
-    return DeadlineExceeded(f"no answer within {timeout_s:.1f} s ({reply.payload})", where=selector)
+    if is_timeout(reply):
+        return DeadlineExceeded(f"no answer within {timeout_s:.1f} s", where=selector)
+    return told_error(reply, selector).error()
+
+
+def is_timeout(reply: zenoh.ReplyError) -> bool:
+    """Whether an error is zenoh's own: plain text, and the only one that reaches a caller is its time-out."""
+    return str(reply.encoding) != JSON
+
+
+def told_error(reply: zenoh.ReplyError, selector: str) -> StageError:
+    """The error that was replied; one that cannot be read is `internal`."""
+    try:
+        return decode_json(reply.payload.to_bytes(), StageError, "error")
+    except InvalidMission as error:
+        return StageError(
+            code=ErrorCode.INTERNAL, message=f"replied an error that cannot be read: {error}", where=selector
+        )
+
+
+def _fail(query: Query, error: BaseException, where: str) -> None:
+    """Answer a query that ended in an exception which nobody expected."""
+    _log.error("%s: no answer", where, exc_info=error)
+    query.fail(ErrorReply.of(Internal(described(error), where=where)))

@@ -10,15 +10,21 @@ import argparse
 import logging
 import os
 import sys
+from collections.abc import Callable
 
 from oxbow.bus.config import DEFAULT_ENDPOINT
 from oxbow.bus.session import Session
-from oxbow.errors import OxbowError, Unavailable
+from oxbow.errors import InvalidMission, OxbowError, Unavailable
+from oxbow.ids import checked_id
 from oxbow.lifetime import Lifetime
 from oxbow.stage.service import Stage
-from oxbow.stage.worker import Worker
+from oxbow.stage.worker import DEFAULT_MEMORY_MB, Worker
 
 __all__ = ["serve_stage"]
+
+MEMORY_VARIABLE = "OXBOW_WORKER_MEMORY_MB"
+LEAST_MEMORY_MB = 256
+"""What a worker process needs to start."""
 
 _log = logging.getLogger(__name__)
 
@@ -36,7 +42,7 @@ def serve_stage(endpoint: str, handler: str, argv: list[str] | None = None) -> N
     options = _options(handler, argv)
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s")
     lifetime = Lifetime(options.parent)
-    worker = Worker(endpoint, handler, options.instance)
+    worker = Worker(endpoint, handler, options.instance, options.memory_mb)
     try:
         session = Session.join(options.connect, lambda: lifetime.over)
         if session is not None:
@@ -62,8 +68,33 @@ def _options(handler: str, argv: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog=program, description=f"Serve {handler} on the bus.")
     parser.add_argument("--connect", default=DEFAULT_ENDPOINT, help="the router's endpoint (default: %(default)s)")
     parser.add_argument(
-        "--instance", default=f"pid{os.getpid()}", help="this replica's name (default: %(default)s)"
+        "--instance",
+        type=checked_id,
+        default=f"pid{os.getpid()}",
+        help="this replica's name (default: %(default)s)",
     )
-    parser.add_argument("--queue", type=int, default=16, help="requests that may wait (default: %(default)s)")
+    parser.add_argument(
+        "--queue", type=_count(1), default=16, help="requests that may wait (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--memory-mb",
+        type=_count(LEAST_MEMORY_MB),
+        default=os.environ.get(MEMORY_VARIABLE, str(DEFAULT_MEMORY_MB)),
+        help=f"what the worker process may take, also ${MEMORY_VARIABLE} (default: %(default)s)",
+    )
     parser.add_argument("--parent", type=int, help="end when this parent process has ended")
-    return parser.parse_args(argv)
+    try:
+        return parser.parse_args(argv)
+    except InvalidMission as error:
+        parser.error(str(error))
+
+
+def _count(least: int) -> Callable[[str], int]:
+    """Reads a whole number from `least` to a million."""
+
+    def count(text: str) -> int:
+        if not (text.isdecimal() and len(text) <= 7 and least <= int(text) <= 10**6):
+            raise argparse.ArgumentTypeError(f"is {text!r}; expected a whole number from {least} to {10**6}")
+        return int(text)
+
+    return count

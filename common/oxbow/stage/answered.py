@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections import OrderedDict
+from dataclasses import dataclass
 
+from oxbow.errors import InvalidMission
 from oxbow.stage.wire import Done, Failed
 
-__all__ = ["Answered"]
+__all__ = ["Answered", "digest", "require_same"]
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """An answer, and of what."""
+
+    digest: bytes
+    answer: Done | Failed
 
 
 class Answered:
@@ -17,19 +28,40 @@ class Answered:
 
     def __init__(self, most_bytes: int) -> None:
         self.most_bytes = most_bytes
-        self._answers: OrderedDict[str, Done | Failed] = OrderedDict()
+        self._kept: OrderedDict[str, _Kept] = OrderedDict()
         self._bytes = 0
 
-    def get(self, request_id: str) -> Done | Failed | None:
-        return self._answers.get(request_id)
+    def get(self, request_id: str, request: bytes) -> Done | Failed | None:
+        """The answer to a request, where it is there; `InvalidMission` where it is to another request."""
+        kept = self._kept.get(request_id)
+        if kept is None:
+            return None
+        require_same(request_id, kept.digest, request)
+        return kept.answer
 
-    def put(self, request_id: str, answer: Done | Failed) -> None:
-        """Keep an answer, and forget the oldest ones that no longer fit."""
-        self._answers[request_id] = answer
+    def put(self, request_id: str, request_digest: bytes, answer: Done | Failed) -> None:
+        """Keep the answer to a request, and forget the oldest ones that no longer fit."""
+        self._forget(self._kept.pop(request_id, None))
+        self._kept[request_id] = _Kept(request_digest, answer)
         self._bytes += _size(answer)
         while self._bytes > self.most_bytes:
-            _, forgotten = self._answers.popitem(last=False)
-            self._bytes -= _size(forgotten)
+            self._forget(self._kept.popitem(last=False)[1])
+
+    def _forget(self, kept: _Kept | None) -> None:
+        self._bytes -= 0 if kept is None else _size(kept.answer)
+
+
+def digest(request: bytes) -> bytes:
+    """What tells one request from another."""
+    return hashlib.blake2b(request, digest_size=32).digest()
+
+
+def require_same(request_id: str, known: bytes, request: bytes) -> None:
+    """Refuse a request under the id of another one: it would get the other one's answer."""
+    if digest(request) != known:
+        raise InvalidMission(
+            f"is {request_id!r}, the id of another request; expected one for each", where="request_id"
+        )
 
 
 def _size(answer: Done | Failed) -> int:

@@ -16,12 +16,22 @@ import msgspec
 from oxbow.bus.mailbox import Mailbox
 from oxbow.bus.query import MSGPACK, Query
 from oxbow.bus.session import Session
-from oxbow.envelope import Envelope
-from oxbow.errors import Busy, DeadlineExceeded, ErrorReply, InvalidMission, OxbowError, Unavailable
+from oxbow.envelope import Envelope, StageError
+from oxbow.errors import (
+    Busy,
+    DeadlineExceeded,
+    ErrorReply,
+    Internal,
+    InvalidMission,
+    OxbowError,
+    Unavailable,
+    described,
+)
+from oxbow.ids import excerpt
 from oxbow.introspection import Info, Ping, Stats, rss_bytes
-from oxbow.stage.answered import Answered
+from oxbow.stage.answered import Answered, digest, require_same
 from oxbow.stage.wire import Described, Done, Failed, Job, Shown
-from oxbow.stage.worker import Worker, WorkerLost
+from oxbow.stage.worker import Worker
 
 __all__ = ["Stage"]
 
@@ -73,6 +83,7 @@ class Stage:
         self._requests = Mailbox("requests", self._work, size=queue_size)
         self._queryable = session.declare_queryable(self.described.instance_key, self._accept)
         session.answer(self.described.introspection_keys.values(), self._introspect)
+        session.answer(f"{self.described.instance_key}/*/**", self._refuse)
         session.declare_live(self.described.live_key)
         _log.info("%s serves %s", self.described.instance_key, worker.handler)
 
@@ -84,11 +95,13 @@ class Stage:
 
     def _accept(self, query: Query) -> None:
         """Queue a request; on the network thread, so nothing here may take its time."""
+        request_id = ""
         try:
             envelope = self._envelope(query)
+            request_id = envelope.request_id
             answer = self._enqueue(envelope, query)
         except OxbowError as error:
-            answer = Failed(error=ErrorReply.of(error))
+            answer = Failed(request_id=request_id, error=ErrorReply.of(error))
         if answer is not None:
             self._reply(query, answer)
 
@@ -96,19 +109,17 @@ class Stage:
         size, most = query.size_bytes, self.described.most_request_bytes
         if size > most:
             raise InvalidMission(f"is {size} bytes; at most {most}", where=self.described.stage)
-        try:
-            return msgspec.json.decode(query.attachment, type=Envelope)
-        except msgspec.DecodeError as error:
-            raise InvalidMission(f"is no Envelope: {error}", where="attachment") from error
+        return Envelope.decode(query.attachment)
 
     def _enqueue(self, envelope: Envelope, query: Query) -> Done | Failed | None:
         """Wait for the answer to an equal request, or queue a new one; return an answer that is there already."""
         with self._lock:
             same = self._open.get(envelope.request_id)
             if same is not None:
+                require_same(envelope.request_id, digest(same.queries[0].payload), query.payload)
                 same.queries.append(query)
                 return None
-            answer = self._answered.get(envelope.request_id)
+            answer = self._answered.get(envelope.request_id, query.payload)
             if answer is not None:
                 return answer
             exchange = _Exchange(envelope, query)
@@ -120,23 +131,34 @@ class Stage:
             return None
 
     def _work(self, exchange: _Exchange) -> None:
+        """Answer a request, whatever is raised on the way."""
         started = time.monotonic()
-        request_id = exchange.envelope.request_id
+        answer: Done | Failed = self._fault(exchange, "was left without an answer")
         try:
             answer = self._answer(exchange)
-            with self._lock:
-                self._answered.put(request_id, answer)
         except OxbowError as error:
-            answer = Failed(error=ErrorReply.of(error))
-        with self._lock:
-            del self._open[request_id]
-            self._served += 1
-            self._failed += isinstance(answer, Failed)
-            self._seconds.append(time.monotonic() - started)
-        for query in exchange.queries:
-            self._reply(query, answer)
+            answer = Failed(request_id=exchange.envelope.request_id, error=ErrorReply.of(error))
+        except BaseException as error:  # noqa: BLE001 - becomes an `internal` reply
+            _log.exception("request %s", exchange.envelope.request_id)
+            answer = self._fault(exchange, described(error))
+        finally:
+            self._settle(exchange, answer, time.monotonic() - started)
         with suppress(Unavailable):
             self._require_worker()
+
+    def _fault(self, exchange: _Exchange, message: str) -> Failed:
+        error = Internal(message, where=self.described.instance_key)
+        return Failed(request_id=exchange.envelope.request_id, error=ErrorReply.of(error))
+
+    def _settle(self, exchange: _Exchange, answer: Done | Failed, seconds: float) -> None:
+        """Let go of a request, and answer all who wait for it."""
+        with self._lock:
+            del self._open[exchange.envelope.request_id]
+            self._served += 1
+            self._failed += isinstance(answer, Failed)
+            self._seconds.append(seconds)
+        for query in exchange.queries:
+            self._reply(query, answer)
 
     def _answer(self, exchange: _Exchange) -> Done | Failed:
         """Have the worker answer; what is raised here says nothing of the request, which may be asked again."""
@@ -145,12 +167,17 @@ class Stage:
             raise DeadlineExceeded("not started: the deadline passed in the queue", where=self.described.stage)
         self._require_worker()
         show = bool(envelope.mission_id and self._audience)
-        job = Job(envelope=envelope, payload=exchange.queries[0].payload, show=show)
+        payload = exchange.queries[0].payload
+        job = Job(envelope=envelope, payload=payload, show=show)
         try:
-            return self.worker.run(job, self._publish)
-        except (WorkerLost, DeadlineExceeded) as error:
+            answer = self.worker.run(job, self._publish)
+        except OxbowError as error:
             _log.error("request %s: %s", envelope.request_id, error)
             raise
+        of = digest(payload)
+        with self._lock:
+            self._answered.put(envelope.request_id, of, answer)
+        return answer
 
     def _require_worker(self) -> None:
         """Replace a worker process that has ended; where that fails, this replica ends."""
@@ -165,14 +192,27 @@ class Stage:
             raise
 
     def _publish(self, shown: Shown) -> None:
-        self.session.publish(shown.key, shown.payload, encoding=MSGPACK, droppable=True)
+        """Publish a layer; where that fails, it is lost, and the plan is not."""
+        try:
+            self.session.publish(shown.key, shown.payload, encoding=MSGPACK, droppable=True)
+        except OxbowError as error:
+            _log.warning("a layer is lost: %s", error)
 
     def _reply(self, query: Query, answer: Done | Failed) -> None:
-        with query:
-            if isinstance(answer, Done):
-                query.reply(self.described.instance_key, answer.payload, encoding=MSGPACK)
-            else:
-                query.fail(answer.error)
+        try:
+            with query:
+                if isinstance(answer, Done):
+                    about = answer.request_id.encode()
+                    query.reply(self.described.instance_key, answer.payload, encoding=MSGPACK, attachment=about)
+                else:
+                    query.fail(StageError.about(answer.request_id, answer.error))
+        except BaseException:  # noqa: BLE001 - who asked is gone; others may wait for the same answer
+            _log.exception("request %s: the answer is lost", answer.request_id)
+
+    def _refuse(self, key: str, _parameters: dict[str, str], _payload: bytes) -> Iterator[tuple[str, bytes]]:
+        """Answer whoever asks for a key that is none: silence would look like a replica that is lost."""
+        keys = (self.described.instance_key, *self.described.introspection_keys.values())
+        raise InvalidMission(f"is {excerpt(key)}; expected {', '.join(keys)}", where="key")
 
     def _introspect(self, key: str, _parameters: dict[str, str], _payload: bytes) -> Iterator[tuple[str, bytes]]:
         answers = {"ping": self._ping, "info": self._info, "stats": self._stats, "schema": self._schema}

@@ -1,4 +1,7 @@
-"""What a stage's session process and its worker process say to each other, over a pipe (MessagePack)."""
+"""What a stage's session process and its worker process say to each other, over a pipe (MessagePack).
+
+Everything that the worker says of a job carries the job's request id: an answer to another job is none.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,10 @@ import msgspec
 from oxbow.envelope import Envelope
 from oxbow.errors import ErrorReply
 
-__all__ = ["Described", "Done", "Failed", "FromWorker", "Job", "Shown"]
+__all__ = ["MOST_MESSAGE_BYTES", "Described", "Done", "Failed", "FromWorker", "Job", "Shown"]
+
+MOST_MESSAGE_BYTES = 2**28
+"""More than any message takes: the largest reply, and what stands around it."""
 
 
 class Job(msgspec.Struct, frozen=True, kw_only=True):
@@ -37,6 +43,7 @@ class Described(msgspec.Struct, frozen=True, kw_only=True, tag=True):
 class Shown(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     """A layer to publish."""
 
+    request_id: str
     key: str
     payload: bytes
 
@@ -44,12 +51,14 @@ class Shown(msgspec.Struct, frozen=True, kw_only=True, tag=True):
 class Done(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     """The encoded reply to a job."""
 
+    request_id: str
     payload: bytes
 
 
 class Failed(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     """The error that a job ended in."""
 
+    request_id: str
     error: ErrorReply
 
 

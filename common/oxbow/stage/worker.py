@@ -6,23 +6,32 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from multiprocessing import Pipe
 
 import msgspec
 
-from oxbow.errors import DeadlineExceeded, Unavailable
-from oxbow.stage.wire import Described, Done, Failed, FromWorker, Job, Shown
+from oxbow.errors import DeadlineExceeded, Infeasible, OxbowError, Unavailable
+from oxbow.stage.watch import STOPPED_S, Verdict, Watch, is_stopped
+from oxbow.stage.wire import MOST_MESSAGE_BYTES, Described, Done, Failed, FromWorker, Job, Shown
 
-__all__ = ["Worker", "WorkerLost"]
+__all__ = ["DEFAULT_MEMORY_MB", "Worker", "WorkerLost", "needs_memory"]
 
+DEFAULT_MEMORY_MB = 4096
 START_S = 30.0
 END_S = 2.0
 
+_FULL_SHARE = 0.5
+"""A process that dies of a fault with so much of its memory taken has died of its limit: the next piece of memory
+that it asked for was the one too many, and libraries in C seldom survive that."""
+
+_FAULTS = {-signal.SIGABRT, -signal.SIGSEGV, -signal.SIGBUS}
+
 
 class WorkerLost(Unavailable):
-    """The worker process died with a job."""
+    """The worker process died with a job, or did what no worker does."""
 
 
 class Worker:
@@ -37,12 +46,15 @@ class Worker:
         As ``package.module:attribute``.
     instance
         The replica's name.
+    memory_mb
+        What the process may take.
     """
 
-    def __init__(self, endpoint: str, handler: str, instance: str) -> None:
+    def __init__(self, endpoint: str, handler: str, instance: str, memory_mb: int = DEFAULT_MEMORY_MB) -> None:
         self.endpoint = endpoint
         self.handler = handler
         self.instance = instance
+        self.memory_mb = memory_mb
         self.restarts = 0
         self._launch()
 
@@ -56,49 +68,56 @@ class Worker:
         Raises
         ------
         Unavailable
-            It ended, or stayed silent, before it was ready.
+            It ended, stayed silent, or said something else, before it was ready.
         """
         try:
-            described = self._receive(START_S)
-        except (WorkerLost, TimeoutError) as error:
-            self._kill()
+            with self._watched(time.time() + START_S):
+                message = self._receive()
+                if not isinstance(message, Described):
+                    raise self._misconduct(message)
+        except (WorkerLost, DeadlineExceeded, Infeasible) as error:
             raise Unavailable(f"the worker process did not start: {error}", where=self.handler) from error
-        assert isinstance(described, Described)
-        return described
+        return message
 
     def run(self, job: Job, on_shown: Callable[[Shown], None]) -> Done | Failed:
         """Run a job, and call `on_shown` with each layer on the way.
 
+        Whatever is raised, the process is gone: nothing that it may still say can pass for the answer to another
+        job.
+
         Raises
         ------
         WorkerLost
-            The process died.
+            The process died, was frozen, or said something else than the answer to this job.
         DeadlineExceeded
             The deadline passed; the process is stopped, since nobody waits for what it does.
+        Infeasible
+            The process died for want of memory.
         """
-        try:
+        with self._watched(job.envelope.deadline_s):
+            if self._pipe.poll():
+                raise self._misconduct(self._receive())
             self._pipe.send_bytes(msgspec.msgpack.encode(job))
-        except OSError as error:
-            raise WorkerLost(self._obituary(), where=self.handler) from error
-        while True:
-            try:
-                message = self._receive(job.envelope.remaining_s())
-            except TimeoutError:
-                self._kill()
-                raise DeadlineExceeded("stopped at the deadline, not done yet", where=self.handler) from None
-            if isinstance(message, Done | Failed):
-                return message
-            if isinstance(message, Shown):
+            while True:
+                message = self._receive()
+                if isinstance(message, Described) or message.request_id != job.envelope.request_id:
+                    raise self._misconduct(message)
+                if not isinstance(message, Shown):
+                    return message
                 on_shown(message)
 
     def alive(self) -> bool:
-        return self._process.poll() is None
+        """Whether the process can take a job."""
+        return self._process.poll() is None and not is_stopped(self.pid)
 
     def restart(self) -> None:
-        """Replace the process by a new one, and wait until it is ready."""
+        """Replace the process by a new one, and wait until it is ready; `Unavailable` where that fails."""
         self.restarts += 1
         self._kill()
-        self._launch()
+        try:
+            self._launch()
+        except OSError as error:
+            raise Unavailable(f"the worker process cannot be started: {error}", where=self.handler) from error
         self.describe()
 
     def close(self) -> None:
@@ -113,36 +132,77 @@ class Worker:
         self._pipe, theirs = Pipe()
         with theirs:
             fd = theirs.fileno()
+            arguments = [str(fd), self.endpoint, self.handler, self.instance, str(self.memory_mb)]
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "oxbow.stage.process", str(fd), self.endpoint, self.handler, self.instance],
+                [sys.executable, "-m", "oxbow.stage.process", *arguments],
                 pass_fds=[fd],
                 stdin=subprocess.DEVNULL,
                 stdout=2,  # what a handler prints is no data
                 env=_one_threaded(),
             )
 
-    def _receive(self, timeout_s: float) -> FromWorker:
+    @contextmanager
+    def _watched(self, deadline_s: float) -> Iterator[None]:
+        """Kill the process at the deadline, where it freezes, and on whatever is raised."""
+        watch = Watch(self._process, deadline_s)
         try:
-            if not self._pipe.poll(max(0.0, timeout_s)):
-                raise TimeoutError(f"silent for {timeout_s:.1f} s")
-            data = self._pipe.recv_bytes()
-        except (EOFError, ConnectionError) as error:
-            raise WorkerLost(self._obituary(), where=self.handler) from error
-        message: FromWorker = msgspec.msgpack.decode(data, type=FromWorker)
+            with watch:
+                yield
+        except (EOFError, OSError) as error:
+            raise self._loss(watch) from error
+        except BaseException:
+            self._kill()
+            raise
+
+    def _receive(self) -> FromWorker:
+        data = self._pipe.recv_bytes(MOST_MESSAGE_BYTES)
+        try:
+            message: FromWorker = msgspec.msgpack.decode(data, type=FromWorker)
+        except (msgspec.MsgspecError, ValueError) as error:
+            raise WorkerLost(f"worker process {self.pid} sent garbage: {error}", where=self.handler) from error
         return message
 
-    def _obituary(self) -> str:
-        with suppress(subprocess.TimeoutExpired):
-            self._process.wait(END_S)
-        self._kill()
-        status = self._process.returncode
-        cause = f"by {signal.Signals(-status).name}" if status < 0 else f"with status {status}"
-        return f"worker process {self.pid} ended {cause}"
+    def _misconduct(self, message: FromWorker) -> WorkerLost:
+        kind = type(message).__name__
+        about = "" if isinstance(message, Described) else f" to request {message.request_id!r}"
+        return WorkerLost(f"worker process {self.pid} sent {kind}{about}, unasked", where=self.handler)
+
+    def _loss(self, watch: Watch) -> OxbowError:
+        """What to say of a process whose pipe is closed."""
+        if watch.verdict is Verdict.LATE:
+            return DeadlineExceeded("stopped at the deadline, not done yet", where=self.handler)
+        if watch.verdict is Verdict.FROZEN:
+            reason = f"worker process {self.pid} was frozen for {STOPPED_S:g} s, and killed"
+            return WorkerLost(reason, where=self.handler)
+        try:
+            status = self._process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            return WorkerLost(f"worker process {self.pid} closed its pipe, or sent garbage", where=self.handler)
+        finally:
+            self._kill()
+        if status in _FAULTS and watch.data_bytes > _FULL_SHARE * self.memory_mb * 2**20:
+            return needs_memory(self.memory_mb, self.handler)
+        cause = f"by {_signal_name(-status)}" if status < 0 else f"with status {status}"
+        return WorkerLost(f"worker process {self.pid} ended {cause}", where=self.handler)
 
     def _kill(self) -> None:
         self._pipe.close()
         self._process.kill()
         self._process.wait()
+
+
+def needs_memory(memory_mb: int, where: str) -> Infeasible:
+    """The error of a request that does not fit."""
+    return Infeasible(
+        f"needs more than the {memory_mb} MB of memory that a worker process may take (--memory-mb)", where=where
+    )
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 def _one_threaded() -> dict[str, str]:
