@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from typing import Any, TypeVar
 
 import msgspec
@@ -11,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from oxbow.errors import InvalidMission
 
-__all__ = ["decode", "encode"]
+__all__ = ["decode", "digest", "encode"]
 
 T = TypeVar("T")
 
@@ -45,6 +46,11 @@ _ENCODER = msgspec.msgpack.Encoder(enc_hook=_to_wire)
 def encode(message: msgspec.Struct) -> bytes:
     """MessagePack bytes of a message."""
     return _ENCODER.encode(message)
+
+
+def digest(message: msgspec.Struct) -> str:
+    """A digest of a message: equal where its bytes are."""
+    return hashlib.sha256(encode(message)).hexdigest()
 
 
 def decode(data: bytes, kind: type[T]) -> T:

@@ -5,20 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import msgspec
 import numpy as np
 import shapely
 from shapely import MultiLineString
 
+from oxbow import codec
+from oxbow.conformance import Conduct, Shore
 from oxbow.contracts import Certificate, CertifyRequest, Conformance, Track
 from oxbow.route import Danger
 from oxbow_certificate.axes import Paths
-from oxbow_certificate.conformance import about_ends, count_crossings, outside_length, unsafe_length
 from oxbow_certificate.cover import CoverRadius, cover_radius, least_radius
 from oxbow_certificate.discrepancy import discrepancy
 from oxbow_certificate.distance import PathDistance
 from oxbow_certificate.headings import count_turns, directional_evenness
 from oxbow_certificate.kriging import kriging_variance
-from oxbow_certificate.legs import least_leg_distance
+from oxbow_certificate.legs import about_ends, least_leg_distance
 from oxbow_certificate.region import JudgedSpace
 from oxbow_certificate.spread import DistanceSpread, distance_spread
 
@@ -60,31 +62,40 @@ def judge(request: CertifyRequest) -> Judgement:
     cover = cover_radius(space.judged, distance)
     spread = distance_spread(space.judged, distance)
     least_m = least_radius(space.judged.area, paths.length, len(lines))
-    danger = Danger(request.danger_zones)
-    tracks = tuple(_conformance(track, space, request.safety_m, danger) for track in request.tracks)
+    shore, danger = Shore(space.water, request.safety_m), Danger(request.danger_zones)
+    conducts = [shore.conduct(track.path, track.launch, track.recovery) for track in request.tracks]
+    tracks = tuple(
+        _conformance(track, conduct, danger) for track, conduct in zip(request.tracks, conducts, strict=True)
+    )
     certificate = Certificate(
         **_together(tracks),
         **_water(space),
         **_coverage(cover, spread, least_m),
         **_evenness(request, paths, space, least_m),
         **_kriging(request, paths, spread, least_m),
+        request_digest=codec.digest(request),
         tracks=tracks if len(tracks) > 1 else (),
+        faults=tuple(
+            msgspec.structs.replace(fault, track=number)
+            for number, conduct in enumerate(conducts)
+            for fault in conduct.faults
+        ),
     )
     return Judgement(certificate, paths, space, cover, spread)
 
 
-def _conformance(track: Track, space: JudgedSpace, safety_m: float, danger: Danger) -> Conformance:
+def _conformance(track: Track, conduct: Conduct, danger: Danger) -> Conformance:
     path = track.path
-    crossings = count_crossings(path)
     return Conformance(
         length_m=path.length,
         duration_s=path.length / track.speed_mps,
         waypoints=int(shapely.get_num_coordinates(path)),
-        is_simple=crossings == 0,
-        crossings=crossings,
-        outside_m=outside_length(path, space),
-        unsafe_m=unsafe_length(path, space, safety_m, (track.launch, track.recovery)),
+        is_simple=conduct.crossings == 0,
+        crossings=conduct.crossings,
+        outside_m=conduct.outside_m,
+        unsafe_m=conduct.unsafe_m,
         danger=danger.probability(shapely.get_coordinates(path)) if danger.zones else None,
+        legs=conduct.legs,
     )
 
 
@@ -103,6 +114,7 @@ def _together(tracks: tuple[Conformance, ...]) -> dict[str, Any]:
         "duration_s": duration_s,
         "is_simple": all(track.is_simple for track in tracks),
         "danger": float(1.0 - np.prod(1.0 - np.array(dangers))) if dangers else None,
+        "legs": tracks[0].legs if len(tracks) == 1 else (),
     }
 
 
@@ -136,7 +148,7 @@ def _evenness(request: CertifyRequest, paths: Paths, space: JudgedSpace, least_m
     spacing_m = 2.0 * least_m
     margin_m = max(2.0 * request.safety_m, spacing_m)
     apart_m = [
-        least_leg_distance(track.path, spacing_m, about_ends(space, (track.launch, track.recovery), margin_m))
+        least_leg_distance(track.path, spacing_m, about_ends(space.free, (track.launch, track.recovery), margin_m))
         for track in request.tracks
     ]
     positions = discrepancy(space.judged, paths, spacing_m, 2.0 * space.detail_m)

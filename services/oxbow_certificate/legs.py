@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,11 +12,11 @@ from shapely import LineString, STRtree
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import Indices
-from oxbow.contracts import FloatArray
+from oxbow.contracts import FloatArray, Place
 from oxbow_certificate.axes import main_direction, turned
 from oxbow_certificate.distance import segments_of
 
-__all__ = ["least_leg_distance"]
+__all__ = ["about_ends", "least_leg_distance"]
 
 PARALLEL_RAD = math.radians(30.0)
 """Stretches whose directions differ by no more than this are parallel."""
@@ -63,6 +64,15 @@ def least_leg_distance(path: LineString, spacing_m: float, excused: BaseGeometry
         if least_m < math.inf:
             return least_m
     return None
+
+
+def about_ends(free: BaseGeometry, ends: Sequence[Place], margin_m: float) -> BaseGeometry:
+    """Where legs may meet: about `ends`, the launch and recovery points, within one and a half times the distance
+    to the free space and a margin.
+    """
+    points = shapely.points(ends)
+    radius_m = margin_m + 1.5 * shapely.distance(points, free)
+    return shapely.union_all(shapely.buffer(points, radius_m, quad_segs=16))
 
 
 @dataclass(frozen=True)

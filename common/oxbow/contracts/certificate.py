@@ -11,7 +11,18 @@ from oxbow.contracts.danger import DangerZone
 from oxbow.contracts.message import Message, Place, require_area, require_finite
 from oxbow.errors import InvalidMission
 
-__all__ = ["Certificate", "CertifyRequest", "Conformance", "Measures", "Track", "Variogram", "VariogramModel"]
+__all__ = [
+    "Certificate",
+    "CertifyRequest",
+    "Conformance",
+    "Fault",
+    "Leg",
+    "Measures",
+    "Rule",
+    "Track",
+    "Variogram",
+    "VariogramModel",
+]
 
 
 class VariogramModel(enum.StrEnum):
@@ -86,10 +97,46 @@ class CertifyRequest(Track, frozen=True, kw_only=True):
         return (self, *self.others)
 
 
+class Rule(enum.StrEnum):
+    """What a path must keep to, whatever its launch and recovery points make necessary aside."""
+
+    CROSSING = "crossing"
+    OUTSIDE = "outside"
+    UNSAFE = "unsafe"
+
+
+class Fault(Message, frozen=True, kw_only=True):
+    """A rule that a path breaks: by how many metres or how many times, and a place where it does.
+
+    `leg` is "launch" or "recovery" where the fault is in that leg, `track` the number of the path.
+    """
+
+    rule: Rule
+    place: Place
+    metres: float = 0.0
+    count: int = 0
+    leg: str = ""
+    track: int = 0
+
+
+class Leg(Message, frozen=True, kw_only=True):
+    """The stretch of a path next to its launch or recovery point that runs nearer to the shore than Safety.
+
+    `unsafe_m` metres of it do, `ashore_m` of these over land. The point itself makes `least_ashore_m` and about
+    `most_unsafe_m` necessary: it lies so far from the water, and its way to open water may be so long.
+    """
+
+    unsafe_m: float
+    ashore_m: float
+    least_ashore_m: float
+    most_unsafe_m: float
+
+
 class Conformance(Message, frozen=True, kw_only=True):
     """What there is of a path, and whether it keeps the rules; defined in `docs/quality.md`.
 
-    `danger` is the probability of harm on the way, None where there are no danger zones.
+    `danger` is the probability of harm on the way, None where there are no danger zones. `legs` are those of the
+    launch and of the recovery; there are none in plans of earlier versions.
     """
 
     length_m: float
@@ -100,6 +147,7 @@ class Conformance(Message, frozen=True, kw_only=True):
     outside_m: float
     unsafe_m: float
     danger: float | None = None
+    legs: tuple[Leg, ...] = ()
 
 
 class Measures(Conformance, frozen=True, kw_only=True):
@@ -139,8 +187,12 @@ class Measures(Conformance, frozen=True, kw_only=True):
 class Certificate(Measures, frozen=True, kw_only=True):
     """The measures of a path, and the place of the free space that is farthest from it.
 
-    `tracks` are the figures of each path, where there are several.
+    `tracks` are the figures of each path, where there are several. `faults` are the rules that paths break.
+    `request_digest` is that of the request (`oxbow.codec.digest`), so that a certificate cannot be taken for that
+    of another path or another water.
     """
 
+    request_digest: str
     worst_gap: Place | None = None
     tracks: tuple[Conformance, ...] = ()
+    faults: tuple[Fault, ...] = ()
