@@ -125,6 +125,7 @@ EXAMPLES: dict[type[msgspec.Struct], msgspec.Struct] = {
             least_leg_distance_m=10.0,
             discrepancy=0.25,
             discrepancy_ratio=1.7,
+            request_digest="9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08",
             directional_evenness=0.44,
             turns=5,
             worst_gap=(92.2, 55.0),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,6 +35,9 @@ from oxbow.vehicles import VehiclePath
 __all__ = ["completed"]
 
 SAME_PLACE_M = 1e-3
+
+LONG_LEG = 2.0
+"""A leg of more than so many safety distances within Safety is warned of: it does not lead straight off."""
 
 
 def completed(
@@ -138,11 +141,27 @@ def _fleet(teams: Sequence[TeamPlan], written: Sequence[Sequence[_Written]]) -> 
 
 
 def _team_warnings(mission: Mission, options: PlanOptions, team: TeamPlan) -> tuple[str, ...]:
+    warnings = (*_unsafe_legs(mission, team), *team.warnings)
     if not any(plan.hot_spots for plan in team.vehicles):
-        return team.warnings + _near_legs(mission, team)
+        return warnings + _near_legs(mission, team)
     if options.smooth:
-        return (*team.warnings, "passes over hot spots keep their corners: only surveys are smoothed")
-    return team.warnings
+        return (*warnings, "passes over hot spots keep their corners: only surveys are smoothed")
+    return warnings
+
+
+def _unsafe_legs(mission: Mission, team: TeamPlan) -> Iterator[str]:
+    """What launch and recovery points make necessary: ways over land, and long ones within Safety."""
+    tracks = team.certificate.tracks or (team.certificate,)
+    for plan, track in zip(team.vehicles, tracks, strict=True):
+        vehicle = plan.member.vehicle
+        for field, leg in zip(("LaunchPoint", "RecoveryPoint"), track.legs, strict=True):
+            if field == "RecoveryPoint" and vehicle.recovery == vehicle.start:
+                continue
+            where = plan.member.told(plan.member.fields.get(field, field))
+            if leg.ashore_m > 0.0:
+                yield f"{where} lies ashore: {leg.ashore_m:.3g} m of its leg lead over land"
+            if leg.unsafe_m > LONG_LEG * mission.safety_m + leg.ashore_m:
+                yield f"{where} lies in narrow water: {leg.unsafe_m:.0f} m of its leg are within Safety"
 
 
 def _near_legs(mission: Mission, team: TeamPlan) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol, TypeVar
 
 import msgspec
@@ -11,6 +12,7 @@ from shapely import Polygon
 
 from oxbow.approach import Approach, Harbour
 from oxbow.completion import completed
+from oxbow.conformance import Shore
 from oxbow.contracts import (
     ASSIGN,
     CERTIFY,
@@ -36,6 +38,7 @@ from oxbow.errors import Infeasible, renamed
 from oxbow.fleet import Member, TeamPlan, VehiclePlan
 from oxbow.mission import Mission, PlanOptions
 from oxbow.site import Site
+from oxbow.verification import CheckedCall, require_faultless, require_fit_to_follow
 
 __all__ = ["Call", "expected_calls", "plan_mission"]
 
@@ -61,6 +64,11 @@ class Task:
     site: Site
     space: FreeSpace
     call: Call
+
+    @cached_property
+    def shore(self) -> Shore:
+        """What paths are judged by before they leave."""
+        return Shore(self.site.water, self.mission.safety_m)
 
     def part(self, member: Member) -> str:
         """Which part of the mission a vehicle is, where there are several."""
@@ -90,9 +98,11 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
     Raises
     ------
     OxbowError
-        Whatever a stage raised: nothing is planned by half.
+        Whatever a stage raised: nothing is planned by half. `Internal` where a reply does not belong to its
+        request, or a path breaks a rule of the water: it is not handed out.
     """
     options = options or PlanOptions()
+    call = CheckedCall(call)
     site = Site.of(mission)
     contour = ContourRequest(
         outline=site.outline,
@@ -142,10 +152,14 @@ def treatment(task: Task) -> TeamPlan:
     if not assignment.sorties:
         reasons = "; ".join(f"{left.hot_spot}: {left.reason}" for left in assignment.left)
         raise Infeasible(f"has no hot spot that can be treated ({reasons})", where="PriorModel")
-    vehicles = tuple(
-        VehiclePlan(member=team[sortie.vehicle], path=sortie.path, hot_spots=sortie.hot_spots)
-        for sortie in assignment.sorties
+    vehicles, further = (
+        tuple(
+            VehiclePlan(member=team[sortie.vehicle], path=sortie.path, hot_spots=sortie.hot_spots)
+            for sortie in sorties
+        )
+        for sorties in (assignment.sorties, assignment.further)
     )
+    require_fit_to_follow(task.shore, task.site.frame, further)
     treated = {name for sortie in assignment.sorties for name in sortie.hot_spots}
     areas = tuple(spot.area for spot in task.site.hot_spots if spot.name in treated)
     return TeamPlan(vehicles, _certified(task, vehicles, areas), assignment)
@@ -228,8 +242,9 @@ def _path(
 
 
 def _certified(task: Task, vehicles: Sequence[VehiclePlan], areas: tuple[Polygon, ...] = ()) -> Certificate:
+    """The certificate of a team's paths, none of which breaks a rule of the water."""
     first, *others = (_track(plan) for plan in vehicles)
-    return task.call(
+    certificate = task.call(
         CERTIFY,
         CertifyRequest(
             **msgspec.structs.asdict(first),
@@ -243,6 +258,9 @@ def _certified(task: Task, vehicles: Sequence[VehiclePlan], areas: tuple[Polygon
         ),
         part=vehicles[0].member.vehicle.role if len(task.mission.mission_type.roles) > 1 else "",
     )
+    require_faultless(certificate.faults, task.site.frame, vehicles)
+    require_fit_to_follow(task.shore, task.site.frame, vehicles)
+    return certificate
 
 
 def _track(plan: VehiclePlan) -> Track:

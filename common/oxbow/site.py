@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from shapely import Point, Polygon
+from shapely import MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contours import Contour, Zone, danger_zones, forbidden_zones
@@ -40,6 +40,8 @@ class Site:
         site whatever its orientation, first point and repeated points.
     zones
         The forbidden zones that meet the outline; they may overlap one another and cross the outline.
+    water
+        The outline less the zones.
     launch, recovery
         The mission's own points.
     members
@@ -64,6 +66,7 @@ class Site:
     frame: Frame
     outline: Polygon
     zones: tuple[Polygon, ...]
+    water: Polygon | MultiPolygon
     launch: Place
     recovery: Place
     members: tuple[Member, ...]
@@ -99,8 +102,8 @@ class Site:
         shapely.prepare(outline)
         forbidden = forbidden_zones(mission, frame, outline)
         zones = tuple(part for zone in forbidden for part in zone.parts)
-        water = outline.difference(shapely.union_all(zones)) if zones else outline
-        if water.area == 0.0:
+        water = _water(outline, zones)
+        if water.is_empty:
             raise Infeasible("cover all of the water; nothing is left to plan on", where="ForbiddenZones")
         areas = () if mission.prior_model is None else weighted_areas(mission.prior_model, frame, outline)
         spots = _hot_spots(mission, frame, outline, water)
@@ -117,6 +120,7 @@ class Site:
             frame=frame,
             outline=outline,
             zones=zones,
+            water=water,
             launch=locate("LaunchPoint", mission.launch),
             recovery=locate("RecoveryPoint", mission.recovery or mission.launch),
             members=fleet,
@@ -147,6 +151,15 @@ def _outline(contour: Contour, frame: Frame) -> Polygon:
     if not polygon.is_valid:
         raise _crossing(contour, frame, polygon)
     return shapely.normalize(polygon)
+
+
+def _water(outline: Polygon, zones: Sequence[Polygon]) -> Polygon | MultiPolygon:
+    """The outline less the zones, without what has no area."""
+    if not zones:
+        return outline
+    parts = shapely.get_parts(outline.difference(shapely.union_all(zones)))
+    water = [part for part in parts if isinstance(part, Polygon) and part.area > 0.0]
+    return water[0] if len(water) == 1 else MultiPolygon(water)
 
 
 def _crossing(contour: Contour, frame: Frame, polygon: Polygon) -> InvalidMission:

@@ -149,7 +149,9 @@ def _fleet_rows(plan: PlanRecord) -> Rows:
             task += f" {vehicle.area_m2 / 1e6:.3f} km2"
         danger = vehicle.certificate.danger
         risk = "" if danger is None else f"; danger {danger:.1%}"
-        yield vehicle.name, f"{vehicle.role}: {way}; {task}{risk}"
+        ashore_m, unsafe_m = _of_legs(vehicle.certificate)
+        legs = f"; legs {ashore_m:.2f} m over land, {unsafe_m:.0f} m within Safety" if unsafe_m else ""
+        yield vehicle.name, f"{vehicle.role}: {way}; {task}{risk}{legs}"
     if plan.treatment is None:
         return
     for spot in plan.treatment.hot_spots:
@@ -250,9 +252,17 @@ def _table(title: str, rows: Rows) -> Table:
 
 
 def _conformance(is_simple: bool | None, found: Conformance) -> str:
-    """Whether the rules are kept; None where a path may cross itself."""
+    """Whether the rules are kept, and what the legs need; None where a path may cross itself."""
     simple = {None: "", True: "never crosses itself; ", False: "CROSSES ITSELF; "}[is_simple]
-    return f"{simple}{found.outside_m:.2f} m outside, {found.unsafe_m:.2f} m within Safety"
+    ashore_m, unsafe_m = _of_legs(found)
+    legs = f"; on its legs {ashore_m:.2f} m over land, {unsafe_m:.0f} m within Safety" if unsafe_m else ""
+    outside_m = max(found.outside_m - ashore_m, 0.0)
+    return f"{simple}{outside_m:.2f} m outside, {found.unsafe_m:.2f} m within Safety{legs}"
+
+
+def _of_legs(found: Conformance) -> tuple[float, float]:
+    """Metres of the legs over land, and nearer to the shore than Safety."""
+    return sum(leg.ashore_m for leg in found.legs), sum(leg.unsafe_m for leg in found.legs)
 
 
 def _dropped(plan: PlanRecord) -> Iterator[str]:

@@ -18,7 +18,6 @@ from oxbow_path.ring import space_filling_curve
 from oxbow_path.task import Display, MethodPlan, PathMethod, Stop, Task, finest_spacing_m
 from oxbow_path.tour import tour
 from oxbow_path.transect import transects
-from oxbow_path.walk.legs import Access
 from oxbow_path.watershed import watershed
 
 __all__ = ["METHODS", "handle"]
@@ -48,7 +47,7 @@ def handle(request: PathRequest, show: Show) -> PathPlan:
         spacing_m=plan.spacing_m,
         steps=plan.steps,
         dropped=dropped_parts(path, request.space.free, plan.reach_m),
-        warnings=(*_leg_warnings(task), *_length_warnings(plan, task)),
+        warnings=tuple(_length_warnings(plan, task)),
     )
 
 
@@ -70,18 +69,6 @@ def _from_launch_to_recovery(path: LineString, request: PathRequest) -> LineStri
     points = np.array(path.coords)
     points[0], points[-1] = request.launch, request.recovery
     return LineString(points)
-
-
-def _leg_warnings(task: Task) -> Iterator[str]:
-    legs: dict[str, Access] = {"LaunchPoint": task.waters.launch, "RecoveryPoint": task.waters.recovery}
-    for where, leg in legs.items():
-        if leg.ashore:
-            yield f"{where} lies ashore: its leg of {leg.line.length:.0f} m begins over land"
-        elif len(leg.leg) > 2:
-            yield (
-                f"{where} is out of sight of the free space: its leg leads {leg.line.length:.0f} m"
-                " through water nearer to the shore than Safety"
-            )
 
 
 def _length_warnings(plan: MethodPlan, task: Task) -> Iterator[str]:

@@ -272,7 +272,7 @@ def test_no_leg_out_of_a_creek_leads_over_land(given):
         assert vehicle.length_ratio <= 1
         assert vehicle.starts_at_launch_m == vehicle.ends_at_recovery_m == 0
         assert vehicle.is_simple or vehicle.role is Role.SLAVE
-    assert any("out of sight of the free space" in text for text in completed.plan.warnings)
+    assert any("lies in narrow water" in text for text in completed.plan.warnings)
 
 
 def test_danger_zones_are_gone_round_and_the_danger_is_told():

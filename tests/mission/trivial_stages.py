@@ -89,6 +89,7 @@ def certify(request: CertifyRequest) -> Certificate:
         p95_distance_m=1.0,
         mean_ratio=1.0,
         p95_ratio=1.0,
+        request_digest=codec.digest(request),
     )
 
 
