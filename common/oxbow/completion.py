@@ -154,7 +154,7 @@ def _unsafe_legs(mission: Mission, team: TeamPlan) -> Iterator[str]:
     tracks = team.certificate.tracks or (team.certificate,)
     for plan, track in zip(team.vehicles, tracks, strict=True):
         vehicle = plan.member.vehicle
-        for field, leg in zip(("LaunchPoint", "RecoveryPoint"), track.legs, strict=True):
+        for field, leg in zip(("LaunchPoint", "RecoveryPoint"), track.legs, strict=False):
             if field == "RecoveryPoint" and vehicle.recovery == vehicle.start:
                 continue
             where = plan.member.told(plan.member.fields.get(field, field))

@@ -67,7 +67,7 @@ def path(request: PathRequest) -> PathPlan:
         raise ZeroDivisionError("a fault of the stage")
     time.sleep(request.seed / 1000)
     (x, y), end = request.launch, request.recovery
-    return PathPlan(path=LineString([(x, y), (x + 10.0, y), end]), spacing_m=10.0, steps=())
+    return PathPlan(path=LineString([(x, y), (x + 10.0, y), (x + 10.0, y + 10.0), end]), spacing_m=10.0, steps=())
 
 
 def certify(request: CertifyRequest) -> Certificate:
