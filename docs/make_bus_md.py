@@ -128,13 +128,18 @@ def _keys() -> str:
         (_mission("status"), "publication and query, `MissionStatus`", "mission → DSS"),
         (_mission("plan"), "publication and query of the latest: the completed Mission File", "mission → DSS"),
         (str(MissionKey("{id}", "plan", "{revision}")), "query: a plan of the history", "DSS → mission"),
+        (_mission("cancel"), "put or query, empty; replies `MissionStatus`", "DSS → mission"),
         (_mission("report"), "put, JSON: vehicle state, track, obstacles, blooms found", "guidance → mission"),
         (_mission("replan"), "publication and query of the latest, as `plan`", "mission → guidance"),
         (str(MissionKey("{id}", "replan", "{revision}")), "query: a replan of the history", "guidance → mission"),
         (PLAN_KEY, "query: Mission File in, completed Mission File out", "DSS → mission"),
         (_stage(), "query with an `Envelope` attached", "mission → stages"),
         *((f"{_stage()}/@{what}", "query, JSON", "operators → stages") for what in INTROSPECTION),
-        (_filled(live_key("STAGE", "INSTANCE")), "liveliness token", "every service"),
+        (
+            _filled(live_key("STAGE", "INSTANCE")),
+            "liveliness token",
+            "every service, and every client as `client`",
+        ),
         (_filled(layer_key("ID", "STAGE", "NAME")), "put, `Stamped`", "stages → recorder, and whoever draws"),
     ]
     return _table(("key expression", "kind", "who"), [(f"`{key}`", kind, who) for key, kind, who in rows])
@@ -145,8 +150,9 @@ def _missions() -> Iterator[str]:
         f"""\
         A Mission File is described in [mission-file.md](mission-file.md). Put to `{_mission("request")}`, it is
         answered by the mission's status alone; asked of the same key, by a `MissionStatus` in reply too; asked of
-        `{PLAN_KEY}`, by the completed Mission File, once it is there. A query may carry the parameters below:
-        `{PLAN_KEY}?{SubmissionParameters(id="lake", seed=3, deadline_s=60.0).text}`.
+        `{PLAN_KEY}`, by the completed Mission File, once it is there. A put to `{_mission("cancel")}` ends
+        whatever of the mission waits or is being planned: it `failed`, `cancelled`. A query may carry the
+        parameters below: `{PLAN_KEY}?{SubmissionParameters(id="lake", seed=3, deadline_s=60.0).text}`.
         """
     )
     yield _message(SubmissionParameters)

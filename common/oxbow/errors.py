@@ -16,6 +16,7 @@ import msgspec
 
 __all__ = [
     "Busy",
+    "Cancelled",
     "DeadlineExceeded",
     "ErrorCode",
     "ErrorReply",
@@ -37,6 +38,7 @@ class ErrorCode(enum.StrEnum):
     UNAVAILABLE = "unavailable"
     BUSY = "busy"
     TIMEOUT = "timeout"
+    CANCELLED = "cancelled"
     INTERNAL = "internal"
 
 
@@ -98,6 +100,12 @@ class DeadlineExceeded(OxbowError):
     code = ErrorCode.TIMEOUT
 
 
+class Cancelled(OxbowError):
+    """Whoever asked for it wants it no more."""
+
+    code = ErrorCode.CANCELLED
+
+
 class Internal(OxbowError):
     """A fault of Oxbow itself."""
 
@@ -105,7 +113,8 @@ class Internal(OxbowError):
 
 
 BY_CODE: dict[ErrorCode, type[OxbowError]] = {
-    kind.code: kind for kind in (InvalidMission, Infeasible, Unavailable, Busy, DeadlineExceeded, Internal)
+    kind.code: kind
+    for kind in (InvalidMission, Infeasible, Unavailable, Busy, DeadlineExceeded, Cancelled, Internal)
 }
 
 

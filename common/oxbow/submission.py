@@ -30,16 +30,22 @@ class SubmissionParameters(PlanOptions, frozen=True, kw_only=True, forbid_unknow
         The mission's id; by default one is made of the site's name and the content.
     deadline_s
         Seconds that planning may take, its wait for a free planner not counted; at most a day.
+    client
+        Who hands it in, by the name of its liveliness token ``oxbow/v1/live/client/{client}``: clients take turns,
+        and what waits for one that is gone is let go. Those without a name share one.
     """
 
     id: str | None = None
     deadline_s: float = DEFAULT_DEADLINE_S
+    client: str = ""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require_finite(self, "deadline_s", above=0.0, most=MOST_DEADLINE_S)
         if self.id is not None:
             checked_id(self.id)
+        if self.client:
+            checked_id(self.client, "client")
 
     @classmethod
     def parse(cls, parameters: Mapping[str, str]) -> SubmissionParameters:
@@ -86,7 +92,7 @@ class Submission:
     @cached_property
     def fingerprint(self) -> str:
         """Equal for two submissions that this version of Oxbow gives the same plan."""
-        options = msgspec.structs.replace(self.parameters, id=None, deadline_s=DEFAULT_DEADLINE_S)
+        options = msgspec.structs.replace(self.parameters, id=None, deadline_s=DEFAULT_DEADLINE_S, client="")
         digest = hashlib.sha256(_version().encode())
         digest.update(msgspec.json.encode(options))
         digest.update(self.document)

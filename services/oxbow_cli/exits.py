@@ -21,12 +21,13 @@ _STATUS = {
     ErrorCode.UNAVAILABLE: 4,
     ErrorCode.BUSY: 4,
     ErrorCode.TIMEOUT: 4,
+    ErrorCode.CANCELLED: 4,
     ErrorCode.INTERNAL: 1,
 }
 
 
 def exit_status(error: Exception) -> int:
-    """2 invalid input, 3 infeasible, 4 unavailable, busy or timed out, 1 a fault of Oxbow's own."""
+    """2 invalid input, 3 infeasible, 4 unavailable, busy, timed out or cancelled, 1 a fault of Oxbow's own."""
     return _STATUS[error.code] if isinstance(error, OxbowError) else _STATUS[ErrorCode.INTERNAL]
 
 

@@ -13,6 +13,7 @@ import platformdirs
 from oxbow.bus import DEFAULT_ENDPOINT, Bus
 from oxbow.errors import Internal, OxbowError, Unavailable
 from oxbow.lifetime import Lifetime
+from oxbow_mission.checks import Checks
 from oxbow_mission.database import Database
 from oxbow_mission.planner import Planner
 from oxbow_mission.registry import Registry
@@ -34,7 +35,7 @@ def main(argv: list[str] | None = None) -> None:
             store = Store(database)
             bus = Bus.join(options.connect, lambda: lifetime.over)
             if bus is not None:
-                with bus, Registry(store, bus) as registry:
+                with bus, Registry(store, bus, max(1, options.workers // 2)) as registry:
                     _serve(bus, registry, options, lifetime)
             database.require_intact()
     except OxbowError as error:
@@ -44,10 +45,14 @@ def main(argv: list[str] | None = None) -> None:
 
 def _serve(bus: Bus, registry: Registry, options: argparse.Namespace, lifetime: Lifetime) -> None:
     vitals = Vitals(bus, options.instance, registry.store.waiting)
-    planner = Planner(registry, bus, vitals, options.workers, on_failure=lifetime.end)
-    MissionService(bus, registry, Reports(registry.store.database, registry.store), options.instance)
-    _log.info("serves missions kept in %s", options.home)
-    lifetime.wait()
+    planner = Planner(registry, bus, vitals, options.workers, memory_mb=options.memory_mb, on_failure=lifetime.end)
+    reports = Reports(registry.store.database, registry.store)
+    with (
+        Checks(options.memory_mb) as checks,
+        MissionService(bus, registry, reports, checks, options.instance),
+    ):
+        _log.info("serves missions kept in %s", options.home)
+        lifetime.wait()
     if planner.failed:
         raise Internal("missions could not be kept; see the log", where=str(options.home))
 
@@ -59,7 +64,13 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
         "--home", type=Path, default=_default_home(), help="where missions are kept (default: %(default)s)"
     )
     parser.add_argument(
-        "--workers", type=int, default=4, help="missions planned at the same time (default: %(default)s)"
+        "--workers",
+        type=int,
+        default=8,
+        help="missions planned at the same time, at most half of them one client's (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--memory-mb", type=int, default=4096, help="what a helper process may take (default: %(default)s)"
     )
     parser.add_argument(
         "--instance", default=f"pid{os.getpid()}", help="the name on the bus (default: %(default)s)"

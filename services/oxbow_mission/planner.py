@@ -1,45 +1,43 @@
-"""Plans accepted missions, a few at a time: the pipeline over the bus, watched."""
+"""Plans accepted missions, several at a time, each in a helper process that asks the stages by way of this one."""
 
 from __future__ import annotations
 
 import logging
 import math
+import queue
 import threading
 import time
 from collections.abc import Callable
-from typing import TypeVar
 
 import msgspec
-from shapely import Point
 
-from oxbow import codec
 from oxbow.bus import Bus, BusCall
 from oxbow.bus.query import MSGPACK
-from oxbow.contracts import Endpoint, Message, any_layer_key, layer_key
-from oxbow.errors import Internal, OxbowError, Unavailable
-from oxbow.mission import Mission, mission_json, parse_mission
-from oxbow.pipeline import expected_calls, plan_mission
-from oxbow.recording import Layer, LayerKind, Stamped
-from oxbow.site import Site
+from oxbow.contracts import STAGES, any_layer_key, layer_key
+from oxbow.errors import DeadlineExceeded, ErrorReply, Internal, OxbowError, Unavailable, described
 from oxbow.submission import SubmissionParameters
+from oxbow_mission.fair import Turns
+from oxbow_mission.helper import Helper, HelperDied, Helpers
 from oxbow_mission.registry import Registry
-from oxbow_mission.store import Job, Revision
+from oxbow_mission.store import MAX_ATTEMPTS, Job
 from oxbow_mission.vitals import Vitals
+from oxbow_mission.wire import STAGE, Answer, Ask, Plan, Planned, Show
 
 __all__ = ["Planner"]
 
-Q = TypeVar("Q", bound=Message)
-R = TypeVar("R", bound=Message)
+GRACE_S = 5.0
+"""How much longer than the deadline a run may take, so that a stage's own words about it arrive."""
 
-STAGE = "mission"
+_ENDPOINTS = {endpoint.stage: endpoint for endpoint in STAGES}
 _log = logging.getLogger(__name__)
 
 
 class Planner:
-    """Threads that plan what the registry has accepted, until it is closed.
+    """Threads that have planned what the registry has accepted, until it is closed.
 
     A stage that is missing is waited for until the mission's deadline: an accepted mission is not given up
-    because a stage is being started again.
+    because a stage is being started again. Each replica of a stage is asked by one run at a time, and the clients
+    whose missions wait for it take turns.
 
     Parameters
     ----------
@@ -51,18 +49,28 @@ class Planner:
         Counts the runs.
     workers
         Missions planned at the same time.
+    memory_mb
+        What a helper process may take.
     on_failure
         Called when an outcome cannot be kept or published: this process had better start anew.
     """
 
     def __init__(
-        self, registry: Registry, bus: Bus, vitals: Vitals, workers: int, on_failure: Callable[[], None]
+        self,
+        registry: Registry,
+        bus: Bus,
+        vitals: Vitals,
+        workers: int,
+        memory_mb: int,
+        on_failure: Callable[[], None],
     ) -> None:
         self.registry = registry
         self.bus = bus
         self.vitals = vitals
+        self.helpers = Helpers("oxbow_mission.run:plan", memory_mb)
         self.on_failure = on_failure
         self.failed = False
+        self.turns = Turns(lambda stage: len(bus.instances(stage)))
         bus.patience_s = math.inf
         self._audience = bus.audience(any_layer_key(STAGE))
         # Daemons: a stage that does not answer must not keep this process from ending.
@@ -79,100 +87,119 @@ class Planner:
                 outcome = self._plan(job)
                 self.vitals.count(time.monotonic() - started, failed=isinstance(outcome, OxbowError))
                 self.registry.settle(job, outcome)
-        except Exception:  # noqa: BLE001 - a full disk, say
+        except BaseException:  # noqa: BLE001 - a full disk, say; zenoh's panics are no Exception
             _log.exception("the planner ends")
             self.failed = True
             self.on_failure()
 
     def _plan(self, job: Job) -> bytes | OxbowError:
-        """The plan, or why there is none; here an unknown exception becomes an `internal` error."""
+        """The plan, or why there is none; here whatever is raised becomes an error."""
         try:
-            return _Run(job, self.registry, self.bus, shown=bool(self._audience)).plan()
+            with self.helpers.one() as helper:
+                run = _Run(job, self, helper, shown=bool(self._audience))
+                with self.registry.cancellable(job, run.cancel):
+                    return run.planned()
         except OxbowError as error:
             return error
-        except Exception as error:  # noqa: BLE001 - becomes an `internal` error
-            _log.exception("mission %s, revision %d", job.revision.mission_id, job.revision.number)
-            return Internal(f"{type(error).__name__}: {error}", where=STAGE)
+        except BaseException as error:  # noqa: BLE001 - becomes an `internal` error
+            _log.exception("%s", job.revision)
+            return Internal(described(error), where=STAGE)
 
 
 class _Run:
-    """One run of the pipeline for one revision of a mission."""
+    """One revision being planned by a helper process."""
 
-    def __init__(self, job: Job, registry: Registry, bus: Bus, *, shown: bool) -> None:
+    def __init__(self, job: Job, planner: Planner, helper: Helper, *, shown: bool) -> None:
         self.job = job
-        self.registry = registry
+        self.planner = planner
+        self.helper = helper
         self.shown = shown
-        self.parameters = msgspec.json.decode(job.request.parameters, type=SubmissionParameters)
-        self.mission = parse_mission(job.request.document)
-        self.site = Site.of(self.mission)
-        self.seconds: dict[str, float] = {}
-        self.calls, self.expected_calls = 0, expected_calls(self.mission)
+        self.over = False
+        parameters = msgspec.json.decode(job.request.parameters, type=SubmissionParameters)
+        self.until = time.monotonic() + parameters.deadline_s + GRACE_S
         self._call = BusCall(
-            bus,
+            planner.bus,
             mission_id=job.revision.mission_id,
-            origin=(self.site.frame.lat, self.site.frame.long),
-            deadline_s=time.time() + self.parameters.deadline_s,
+            deadline_s=time.time() + parameters.deadline_s,
         )
+        self._answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()  # to what is being asked now
 
-    def plan(self) -> bytes:
-        """The completed Mission File, with the id and the revision that it is kept under."""
-        self._show(_site_layer(self.site), droppable=True)
-        try:
-            mission = plan_mission(self.mission, self.parameters, call=self)
-        except OxbowError as error:
-            self._show_outcome("failed", str(error))
-            raise
-        self._show_outcome("done", f"planned in {sum(self.seconds.values()):.2f} s")
-        return mission_json(_stamped(mission, self.job.revision))
-
-    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /, *, part: str = "") -> R:
-        """Call a stage, and tell that it is at work."""
-        if self.registry.closed:
-            raise Unavailable("the service stops; the mission goes on another time", where=STAGE)
-        fraction = min(self.calls / self.expected_calls, 1.0)
-        self.registry.note_progress(self.job, endpoint.stage, fraction)
-        self.calls += 1
-        started = time.monotonic()
-        try:
-            return self._call(endpoint, request, part=part)
-        finally:
-            name = f"{endpoint.stage}_s"
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.monotonic() - started
-
-    def _show_outcome(self, name: str, text: str) -> None:
-        # Not droppable: it tells the recorder that nothing more will come.
-        layer = Layer(stage=STAGE, name=name, kind=LayerKind.LOG, text=text, scalars=self.seconds)
-        self._show(layer, droppable=False)
-
-    def _show(self, layer: Layer, *, droppable: bool) -> None:
-        if not self.shown:
-            return
-        stamped = Stamped(
+    def planned(self) -> bytes:
+        """The completed Mission File; a helper that is killed from outside is replaced."""
+        order = Plan(
             mission_id=self.job.revision.mission_id,
-            origin=self._call.origin,
-            request_id=self._call.run_id,
-            time_s=time.time(),
-            layer=layer,
+            revision=self.job.revision.number,
+            run_id=self._call.run_id,
+            document=self.job.request.document,
+            parameters=self.job.request.parameters,
+            show=self.shown,
         )
-        key = layer_key(self.job.revision.mission_id, STAGE, layer.name)
-        self._call.bus.publish(key, codec.encode(stamped), encoding=MSGPACK, droppable=droppable)
+        while True:
+            try:
+                outcome = self.helper.carry_out(order, self.until - time.monotonic(), self._answer)
+            except HelperDied as error:
+                self._note_death(error)
+            else:
+                if isinstance(outcome, Planned):
+                    return outcome.document
+                raise _error_of(outcome)
+
+    def cancel(self) -> None:
+        """Stop; whatever a stage still does for this run is waited for by nobody."""
+        self.over = True
+        self._answers.put(Answer(error=_STOPPED))
+        self.helper.kill()
+
+    def _note_death(self, error: HelperDied) -> None:
+        if self.over:
+            raise _STOPPED.error()
+        _log.error("%s: %s", self.job.revision, error)
+        if error.is_own_fault and self.planner.registry.store.note_death(self.job.revision) >= MAX_ATTEMPTS:
+            raise Internal(f"{error.message}; so did {MAX_ATTEMPTS} of them, each at this mission", where=STAGE)
+        if time.monotonic() > self.until:
+            raise DeadlineExceeded(error.message, where=STAGE)
+
+    def _answer(self, said: Ask | Show) -> Answer | None:
+        if self.over:
+            raise _STOPPED.error()
+        if isinstance(said, Show):
+            key = layer_key(self.job.revision.mission_id, STAGE, said.name)
+            self.planner.bus.publish(key, said.payload, encoding=MSGPACK, droppable=said.droppable)
+            return None
+        self.planner.registry.note_progress(self.job, said.stage, said.fraction)
+        # On a thread of its own: a run that is cancelled does not wait for the stage, which works on all the same.
+        answers = self._answers = queue.SimpleQueue()
+        threading.Thread(target=self._ask, args=(said, answers), name=f"ask {said.stage}", daemon=True).start()
+        return answers.get()
+
+    def _ask(self, ask: Ask, answers: queue.SimpleQueue[Answer]) -> None:
+        answer = Answer(error=_STOPPED)
+        try:
+            with self.planner.turns.turn(ask.stage, self.job.client, self._is_over) as granted:
+                if granted:
+                    self._call.origin = ask.origin
+                    envelope = self._call.envelope(ask.part)
+                    answer = Answer(payload=self.planner.bus.forward(_ENDPOINTS[ask.stage], ask.payload, envelope))
+                elif not self.over:
+                    late = DeadlineExceeded("no replica was free before the deadline", where=ask.stage)
+                    answer = Answer(error=ErrorReply.of(late))
+        except OxbowError as error:
+            answer = Answer(error=ErrorReply.of(error))
+        except BaseException as error:  # noqa: BLE001 - becomes an `internal` error
+            _log.exception("%s: %s", self.job.revision, ask.stage)
+            answer = Answer(error=ErrorReply.of(Internal(described(error), where=ask.stage)))
+        finally:
+            answers.put(answer)
+
+    def _is_over(self) -> bool:
+        return self.over or time.time() > self._call.deadline_s
 
 
-def _site_layer(site: Site) -> Layer:
-    zones = ("forbidden zone",) * len(site.zones)
-    places = {"launch": site.launch, "recovery": site.recovery}
-    for vehicle in (member.vehicle for member in site.members if member.is_named):
-        places |= {f"{vehicle.name}: start": vehicle.start, f"{vehicle.name}: recovery": vehicle.recovery}
-    names, ends = places.keys(), map(Point, places.values())
-    return Layer(
-        stage=STAGE,
-        name="site",
-        geometries=(site.outline, *site.zones, *ends, *(spot.area for spot in site.hot_spots)),
-        labels=("outline", *zones, *names, *(spot.name for spot in site.hot_spots)),
-    )
+_STOPPED = ErrorReply.of(Unavailable("the run was stopped", where=STAGE))
 
 
-def _stamped(mission: Mission, revision: Revision) -> Mission:
-    assert mission.plan is not None
-    plan = msgspec.structs.replace(mission.plan, mission_id=revision.mission_id, revision=revision.number)
-    return msgspec.structs.replace(mission, plan=plan)
+def _error_of(outcome: object) -> OxbowError:
+    error = getattr(outcome, "error", None)
+    if isinstance(error, ErrorReply):
+        return error.error()
+    return Internal(f"a helper process answered {type(outcome).__name__} to an order to plan", where=STAGE)

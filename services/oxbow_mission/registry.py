@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import logging
+import sqlite3
 import threading
 import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from typing import Self
 from urllib.parse import quote
 
@@ -12,8 +18,8 @@ import msgspec
 from oxbow.bus import Session
 from oxbow.closing import Closing
 from oxbow.contracts import MissionKey, MissionState, MissionStatus, mission_key
-from oxbow.errors import ErrorReply, OxbowError, Unavailable
-from oxbow.submission import Submission
+from oxbow.errors import Cancelled, ErrorReply, Internal, InvalidMission, OxbowError
+from oxbow_mission.fair import Order
 from oxbow_mission.store import Job, Request, Revision, Store
 
 __all__ = ["Registry"]
@@ -21,9 +27,20 @@ __all__ = ["Registry"]
 MOST_ANSWERED_CHARACTERS = 1024
 """Longer ids, percent-encoded, are not answered: no sender could mean them."""
 
+_log = logging.getLogger(__name__)
+
+
+@dataclass
+class _Running:
+    """A revision that is being planned."""
+
+    status: MissionStatus
+    client: str
+    cancels: list[Callable[[], None]] = field(default_factory=list)
+
 
 class Registry(Closing):
-    """The missions, for the threads that take them in, plan them and wait for them.
+    """The missions, for the threads that take them in, plan them and answer for them.
 
     One lock orders all changes, so statuses are published in the order in which they came about.
 
@@ -33,13 +50,19 @@ class Registry(Closing):
         Where they are kept.
     bus
         Where they are published.
+    most_running
+        Missions of one client that are planned at the same time: the others' find a free planner.
     """
 
-    def __init__(self, store: Store, bus: Session) -> None:
+    def __init__(self, store: Store, bus: Session, most_running: int) -> None:
         self.store = store
         self.bus = bus
+        self.most_running = most_running
+        self.on_final: Callable[[MissionStatus], None] = lambda _status: None
+        """Called with each outcome, once it is published."""
         self._changed = threading.Condition()
-        self._running: dict[Revision, MissionStatus] = {}
+        self._order = Order()
+        self._running: dict[Revision, _Running] = {}
         self._closed = False
 
     def __enter__(self) -> Self:
@@ -51,8 +74,11 @@ class Registry(Closing):
         """Change nothing any more: what is being planned waits in the store for another time."""
         with self._changed:
             self._closed = True
-            for revision in self._running:
-                self.store.release(revision)
+            for revision, running in self._running.items():
+                with suppress(OxbowError, sqlite3.Error):  # at the next start, it is found as it is
+                    self.store.release(revision)
+                for cancel in running.cancels:
+                    cancel()
             self._running.clear()
             self._changed.notify_all()
 
@@ -62,13 +88,10 @@ class Registry(Closing):
 
     # ----------------------------------------------------------------- taking in
 
-    def accept(self, submission: Submission) -> MissionStatus:
+    def accept(self, mission_id: str, request: Request, client: str) -> MissionStatus:
         """Take in a checked mission; the status of a new revision, or of the one that is the same."""
-        parameters = msgspec.json.encode(submission.parameters)
-        request = Request(submission.document, parameters, submission.fingerprint)
         with self._changed:
-            status = self.store.accept(submission.mission_id, request)
-            status = self._running.get(Revision.of(status), status)
+            status = self._current(self.store.accept(mission_id, request, client))
             self._publish_status(status)
             self._changed.notify_all()
             return status
@@ -91,27 +114,74 @@ class Registry(Closing):
         )
         self._publish_status(status, chunk)
 
+    def cancel(self, mission_id: str) -> MissionStatus:
+        """End whatever of a mission waits or is being planned; the status of its latest revision.
+
+        Raises
+        ------
+        InvalidMission
+            There is no such mission.
+        """
+        cause = Cancelled("was cancelled", where=f"mission {mission_id}")
+        with self._changed:
+            for revision in self.store.open_revisions(mission_id):
+                running = self._running.pop(revision, None)
+                for cancel in running.cancels if running else ():
+                    cancel()
+                self._announce(self.store.fail(revision, cause))
+            self._changed.notify_all()
+            latest = self.statuses(mission_id)
+        if not latest:
+            raise InvalidMission("is not kept here; expected a mission handed in before", where=mission_id)
+        return latest[0]
+
     # ----------------------------------------------------------------- planning
 
     def claim(self) -> Job | None:
         """Wait for a revision to plan, and take it; None once the registry is closed."""
         with self._changed:
             while not self._closed:
-                job = self.store.claim()
+                job = self._next_job()
                 if job is not None:
-                    self._note_progress(job, "", 0.0)
+                    status = self._planning(job, "", 0.0)
+                    self._running[job.revision] = _Running(status, job.client)
+                    self._publish_status(status)
                     return job
                 self._changed.wait()
         return None
 
+    def _next_job(self) -> Job | None:
+        """A revision of the client that has the fewest being planned, and was served longest ago of these."""
+        running = Counter(each.client for each in self._running.values())
+        waiting = [client for client in self.store.waiting_clients() if running[client] < self.most_running]
+        if not waiting:
+            return None
+        fewest = min(running[client] for client in waiting)
+        client = self._order.next(client for client in waiting if running[client] == fewest)
+        self._order.note(client)
+        return self.store.claim(client)
+
+    @contextmanager
+    def cancellable(self, job: Job, cancel: Callable[[], None]) -> Iterator[None]:
+        """Have `cancel` called where the job is to stop."""
+        with self._changed:
+            running = self._running.get(job.revision)
+            if running is None:
+                cancel()
+            else:
+                running.cancels.append(cancel)
+        yield
+
     def note_progress(self, job: Job, stage: str, fraction: float) -> None:
         """Publish which stage is at work; this is not kept, since after a crash it is no longer so."""
         with self._changed:
-            if not self._closed:
-                self._note_progress(job, stage, fraction)
+            running = self._running.get(job.revision)
+            if running is not None:
+                running.status = self._planning(job, stage, fraction)
+                self._publish_status(running.status)
 
-    def _note_progress(self, job: Job, stage: str, fraction: float) -> None:
-        status = MissionStatus(
+    def _planning(self, job: Job, stage: str, fraction: float) -> MissionStatus:
+        return MissionStatus(
             mission_id=job.revision.mission_id,
             revision=job.revision.number,
             state=MissionState.PLANNING,
@@ -119,21 +189,25 @@ class Registry(Closing):
             fraction=fraction,
             time_s=time.time(),
         )
-        self._running[job.revision] = status
-        self._publish_status(status)
 
     def settle(self, job: Job, outcome: bytes | OxbowError) -> None:
-        """Keep and publish a plan, a completed Mission File, or why there is none."""
+        """Keep and publish a plan, a completed Mission File, or why there is none.
+
+        The outcome of a run that was cancelled or stopped meanwhile is of no use.
+        """
         with self._changed:
-            if self._closed:
+            if self._running.pop(job.revision, None) is None:
                 return
-            if isinstance(outcome, OxbowError):
-                status = self.store.fail(job.revision, outcome)
-            else:
-                status = self.store.finish(job.revision, outcome)
-            del self._running[job.revision]
-            self._announce(status)
+            self._announce(self._kept(job.revision, outcome))
             self._changed.notify_all()
+
+    def _kept(self, revision: Revision, outcome: bytes | OxbowError) -> MissionStatus:
+        if isinstance(outcome, OxbowError):
+            return self.store.fail(revision, outcome)
+        try:
+            return self.store.finish(revision, outcome)
+        except (sqlite3.DataError, OverflowError) as error:  # it is this plan that cannot be kept, not any
+            return self.store.fail(revision, Internal(f"the plan cannot be kept: {error}", where=str(revision)))
 
     # ----------------------------------------------------------------- publishing
 
@@ -146,35 +220,31 @@ class Registry(Closing):
                 self.bus.publish(mission_key(status.mission_id, "replan"), plan)
         self._publish_status(status)
         self.store.mark_announced(Revision.of(status))
+        self.on_final(status)
 
     def _publish_status(self, status: MissionStatus, chunk: str | None = None) -> None:
         key = MissionKey(chunk or status.mission_id, "status")
         self.bus.publish(str(key), msgspec.json.encode(status))
 
+    def is_replan(self, revision: Revision) -> bool:
+        """Whether a revision's plan takes the place of what guidance may be following already."""
+        return revision.number > self.store.planned(revision.mission_id)[0].number
+
     # ----------------------------------------------------------------- asking
 
-    def wait_final(self, status: MissionStatus) -> MissionStatus:
-        """Wait until a revision is done or failed.
-
-        Raises
-        ------
-        Unavailable
-            The service stops before; the revision is kept, and asking again continues with it.
-        """
+    def when_final(self, status: MissionStatus, wait: Callable[[Revision], None]) -> MissionStatus:
+        """The status of a revision; where it is not final, `wait` is called before `on_final` can be."""
         with self._changed:
-            while not status.state.is_final:
-                if self._closed:
-                    raise Unavailable("the mission service is stopping; ask again", where="mission")
-                self._changed.wait()
-                status = self.store.status(Revision.of(status))
-        return status
+            status = self.store.status(Revision.of(status))
+            if not status.state.is_final:
+                wait(Revision.of(status))
+            return status
 
     def statuses(self, mission_id: str | None) -> list[MissionStatus]:
         """The status of one mission's latest revision, or of each mission's."""
         with self._changed:
-            kept = self.store.statuses(mission_id)
-            return [self._running.get(Revision.of(status), status) for status in kept]
+            return [self._current(status) for status in self.store.statuses(mission_id)]
 
-    def is_replan(self, revision: Revision) -> bool:
-        """Whether a revision's plan takes the place of what guidance may be following already."""
-        return revision.number > self.store.planned(revision.mission_id)[0].number
+    def _current(self, kept: MissionStatus) -> MissionStatus:
+        running = self._running.get(Revision.of(kept))
+        return kept if running is None else running.status

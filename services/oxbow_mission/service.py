@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sized
+import threading
+from collections.abc import Callable, Iterator, Sized
 
 import msgspec
 
 from oxbow.bus import Bus
+from oxbow.bus.mailbox import Mailbox
+from oxbow.bus.query import Query
+from oxbow.closing import Closing
 from oxbow.contracts import (
     ANY,
+    MAX_REQUEST_BYTES,
     PLAN_KEY,
     MissionKey,
     MissionStatus,
@@ -17,27 +22,28 @@ from oxbow.contracts import (
     live_key,
     mission_key,
 )
-from oxbow.errors import Internal, InvalidMission, OxbowError
-from oxbow.site import Site
-from oxbow.submission import Submission
+from oxbow.errors import ErrorReply, Internal, InvalidMission, OxbowError, described
+from oxbow_mission.checks import Checks
+from oxbow_mission.incoming import PutRequest, QueriedPlan, QueriedRequest
 from oxbow_mission.registry import Registry
 from oxbow_mission.reports import Reports
 from oxbow_mission.store import Revision
+from oxbow_mission.waiters import MOST, Waiter, Waiters
 
 __all__ = ["MissionService"]
 
-MOST_WAITING = 64
-"""Callers whose plan is waited for at the same time, each by a thread; `MOST_QUEUED` more may queue."""
 MOST_QUEUED = 256
 MOST_UNREAD = 1024
 """Puts that may wait to be read."""
+LOOK_S = 0.5
+"""How often it is looked which clients are gone, whose time is up, and whether the store is still there."""
 
 _log = logging.getLogger(__name__)
 
 Replies = Iterator[tuple[str, bytes]]
 
 
-class MissionService:
+class MissionService(Closing):
     """Answers a DSS and guidance.
 
     A request that is put is answered by the mission's status; one that is asked, by a reply too.
@@ -50,34 +56,71 @@ class MissionService:
         Where missions stand.
     reports
         Where guidance's reports are kept.
+    checks
+        Where requests are checked.
     instance
         The name to be seen alive under.
     """
 
-    def __init__(self, bus: Bus, registry: Registry, reports: Reports, instance: str) -> None:
+    def __init__(self, bus: Bus, registry: Registry, reports: Reports, checks: Checks, instance: str) -> None:
+        self.bus = bus
         self.registry = registry
         self.reports = reports
+        self.checks = checks
+        self.waiters = Waiters()
+        self._over = threading.Event()
+        self._finals = Mailbox[tuple[Waiter, MissionStatus]]("plans", self._answer_final, size=MOST, workers=2)
+        registry.on_final = self._on_final
         bus.subscribe(_any("request"), self._on_request, queue_size=MOST_UNREAD)
+        bus.subscribe(_any("cancel"), self._on_cancel, queue_size=MOST_UNREAD)
         bus.subscribe(_any("report"), self._on_report, queue_size=MOST_UNREAD)
-        bus.answer(_any("request"), self._submit, workers=4, queue_size=MOST_QUEUED)
-        bus.answer(PLAN_KEY, self._plan, workers=MOST_WAITING, queue_size=MOST_QUEUED)
+        self._queryables = [
+            bus.declare_queryable(_any("request"), self._accepting(QueriedRequest)),
+            bus.declare_queryable(PLAN_KEY, self._accepting(QueriedPlan)),
+        ]
+        bus.answer(_any("cancel"), self._cancel, queue_size=MOST_QUEUED)
         bus.answer(_any("status"), self._status, workers=2, queue_size=MOST_QUEUED)
         history = [_any(what, revision) for what in ("plan", "replan") for revision in (None, ANY)]
         bus.answer(history, self._history, workers=2, queue_size=MOST_QUEUED)
+        self._keeper = threading.Thread(target=self._keep_house, name="keeper", daemon=True)
+        self._keeper.start()
         bus.declare_live(live_key("mission", instance))
 
-    # ----------------------------------------------------------------- puts
+    def close(self) -> None:
+        """Take in nothing more; who waits for a plan asks again."""
+        self._over.set()
+        for queryable in self._queryables:
+            queryable.undeclare()
+        self._finals.close()
+
+    # ----------------------------------------------------------------- requests
 
     def _on_request(self, key: str, document: bytes) -> None:
-        mission_id = MissionKey.parse(key).mission_id
-        try:
-            self._take_in(document, {"id": mission_id})
-        except OxbowError as error:
-            _log.warning("mission %s: refused: %s", mission_id, error)
-            self.registry.refuse(mission_id, error)
-        except Exception as error:  # noqa: BLE001 - becomes an `internal` error
-            _log.exception("mission %s: refused", mission_id)
-            self.registry.refuse(mission_id, Internal(f"{type(error).__name__}: {error}", where="mission"))
+        self.checks.put(PutRequest(self.registry, MissionKey.parse(key).mission_id, document))
+
+    def _accepting(self, kind: type[QueriedRequest] | type[QueriedPlan]) -> Callable[[Query], None]:
+        def accept(query: Query) -> None:
+            """Queue a request; on the network thread, so nothing here may take its time."""
+            try:
+                _require_size(query)
+                self.checks.put(kind(self.registry, self.waiters, query))
+            except OxbowError as error:
+                _fail(query, error)
+            except BaseException as error:  # noqa: BLE001 - an unanswered query looks like no service
+                _log.exception("a query has no answer")
+                _fail(query, Internal(described(error), where="mission"))
+
+        return accept
+
+    def _on_final(self, status: MissionStatus) -> None:
+        for waiter in self.waiters.take(Revision.of(status)):
+            self._finals.offer((waiter, status))
+
+    def _answer_final(self, item: tuple[Waiter, MissionStatus]) -> None:
+        waiter, status = item
+        waiter.answer(self.registry.store, status)
+
+    # ----------------------------------------------------------------- other puts and queries
 
     def _on_report(self, key: str, payload: bytes) -> None:
         try:
@@ -85,17 +128,15 @@ class MissionService:
         except OxbowError as error:
             _log.warning("report on %.200s: refused: %s", key, error)
 
-    # ----------------------------------------------------------------- queries
+    def _on_cancel(self, key: str, _payload: bytes) -> None:
+        try:
+            self.registry.cancel(checked_id(MissionKey.parse(key).mission_id))
+        except OxbowError as error:
+            _log.warning("%.200s: refused: %s", key, error)
 
-    def _submit(self, key: str, parameters: dict[str, str], document: bytes) -> Replies:
-        status = self._take_in(document, parameters | {"id": MissionKey.parse(key).mission_id})
-        yield mission_key(status.mission_id, "request"), msgspec.json.encode(status)
-
-    def _plan(self, _key: str, parameters: dict[str, str], document: bytes) -> Replies:
-        status = self.registry.wait_final(self._take_in(document, parameters))
-        if status.error is not None:
-            raise status.error.error()
-        yield PLAN_KEY, self.registry.store.plan(Revision.of(status))
+    def _cancel(self, key: str, _parameters: dict[str, str], _payload: bytes) -> Replies:
+        mission_id = checked_id(MissionKey.parse(key).mission_id)
+        yield mission_key(mission_id, "cancel"), msgspec.json.encode(self.registry.cancel(mission_id))
 
     def _status(self, key: str, _parameters: dict[str, str], _payload: bytes) -> Replies:
         asked = MissionKey.parse(key)
@@ -118,11 +159,21 @@ class MissionService:
         for own_key, each in kept.items():
             yield own_key, self.registry.store.plan(each)
 
-    def _take_in(self, document: bytes, parameters: dict[str, str]) -> MissionStatus:
-        """Check all of a request, so that its sender hears of every fault at once; then keep it."""
-        submission = Submission.parse(document, parameters)
-        Site.of(submission.mission)
-        return self.registry.accept(submission)
+    # ----------------------------------------------------------------- those who are gone
+
+    def _keep_house(self) -> None:
+        present: set[str] = set()
+        while not self._over.wait(LOOK_S):
+            try:
+                alive = set(self.bus.instances("client"))
+                for client in present - alive:
+                    self.checks.drop(client)
+                if let_go := self.waiters.let_go(present - alive):
+                    _log.info("%d queries are waited for by nobody", let_go)
+                present = alive
+                self.registry.store.database.require_intact()
+            except BaseException:  # noqa: BLE001 - the next look may succeed; a store that is lost ends the service
+                _log.exception("looking after what is gone")
 
 
 def _any(what: str, revision: str | None = None) -> str:
@@ -139,3 +190,15 @@ def _require_kept(found: Sized, asked: MissionKey) -> None:
         raise InvalidMission(
             "is not kept here; expected a mission, or a revision of it, handed in before", where=str(asked)
         )
+
+
+def _require_size(query: Query) -> None:
+    if query.size_bytes > MAX_REQUEST_BYTES:
+        raise InvalidMission(
+            f"is {query.size_bytes} bytes; expected at most {MAX_REQUEST_BYTES}", where="Mission File"
+        )
+
+
+def _fail(query: Query, error: OxbowError) -> None:
+    with query:
+        query.fail(ErrorReply.of(error))

@@ -280,11 +280,11 @@ class Store:
             return int(row.fetchone()[0])
 
     def open_revisions(self, mission_id: str) -> list[Revision]:
-        """The revisions of a mission that wait or are being planned, the newest first."""
+        """The revisions of a mission that wait or are being planned, in order."""
         with self.database.reading() as db:
             rows = db.execute(
                 "SELECT mission_id, revision FROM revision WHERE mission_id = ?"
-                " AND state IN ('accepted', 'planning') ORDER BY revision DESC",
+                " AND state IN ('accepted', 'planning') ORDER BY revision",
                 (mission_id,),
             ).fetchall()
         return [Revision(*row) for row in rows]

@@ -60,7 +60,9 @@ def start_service(router: str, tmp_path: Path) -> Iterator[Callable[[], Process]
     started: list[Process] = []
 
     def start() -> Process:
-        started.append(launch("-m", "oxbow_mission", "--connect", router, "--home", str(tmp_path)))
+        started.append(
+            launch("-m", "oxbow_mission", "--connect", router, "--home", str(tmp_path), "--workers", "4")
+        )
         return started[-1]
 
     yield start

@@ -28,7 +28,7 @@ from oxbow_mission.store import SCHEMA, Request, Store
 pytestmark = pytest.mark.processes
 
 WAIT_S = 30.0
-KILLS = 8
+KILLS = 6
 MISSIONS = 8
 
 Process = subprocess.Popen[bytes]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 import uuid
-from collections.abc import Iterable
-from typing import Generic, TypeVar
+from collections.abc import Callable, Iterable
+from typing import Any, Generic, TypeVar
 
 import msgspec
 import zenoh
@@ -22,6 +22,7 @@ __all__ = ["Bus", "BusCall"]
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
+A = TypeVar("A")
 
 MOST_OUTSTANDING = 4
 """Requests of one caller that one replica may hold: enough to keep it at work, few enough to share well."""
@@ -89,10 +90,20 @@ class Bus(Session):
         OxbowError
             Whatever the stage itself raised.
         """
-        payload = codec.encode(request)
+        return self._asked(
+            endpoint, codec.encode(request), envelope, lambda reply: codec.decode(reply, endpoint.reply)
+        )
+
+    def forward(self, endpoint: Endpoint[Any, Any], payload: bytes, envelope: Envelope) -> bytes:
+        """Ask a stage by a request that is encoded already, and return its reply unread; see `call`."""
+        return self._asked(endpoint, payload, envelope, lambda reply: reply)
+
+    def _asked(
+        self, endpoint: Endpoint[Any, Any], payload: bytes, envelope: Envelope, read: Callable[[bytes], A]
+    ) -> A:
         if len(payload) > MAX_REQUEST_BYTES:
             raise InvalidMission(f"is {len(payload)} bytes; at most {MAX_REQUEST_BYTES}", where=endpoint.stage)
-        return _Attempts(self, endpoint, payload, envelope).run()
+        return _Attempts(self, endpoint, payload, envelope, read).run()
 
 
 class BusCall:
@@ -116,7 +127,11 @@ class BusCall:
         self.run_id = uuid.uuid4().hex
 
     def __call__(self, endpoint: Endpoint[Q, R], request: Q, /, *, part: str = "") -> R:
-        envelope = Envelope(
+        return self.bus.call(endpoint, request, self.envelope(part))
+
+    def envelope(self, part: str = "") -> Envelope:
+        """What travels beside the run's next request."""
+        return Envelope(
             request_id=uuid.uuid4().hex,
             deadline_s=self.deadline_s,
             mission_id=self.mission_id,
@@ -124,7 +139,6 @@ class BusCall:
             origin=self.origin,
             part=part,
         )
-        return self.bus.call(endpoint, request, envelope)
 
 
 class _Lost(Unavailable):
@@ -139,14 +153,22 @@ class _Failed(Unavailable):
         self.outcome = outcome
 
 
-class _Attempts(Generic[Q, R]):
-    """The attempts at one request, and what became of them."""
+class _Attempts(Generic[A]):
+    """The attempts at one request, and what became of them; `read` makes an answer of a reply's bytes."""
 
-    def __init__(self, bus: Bus, endpoint: Endpoint[Q, R], payload: bytes, envelope: Envelope) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        endpoint: Endpoint[Any, Any],
+        payload: bytes,
+        envelope: Envelope,
+        read: Callable[[bytes], A],
+    ) -> None:
         self.bus = bus
         self.endpoint = endpoint
         self.payload = payload
         self.envelope = envelope
+        self.read = read
         self.attachment = msgspec.json.encode(envelope)
         self.started = time.monotonic()
         self.tried: dict[str, str] = {}
@@ -154,7 +176,7 @@ class _Attempts(Generic[Q, R]):
         self.failures = 0
         self.pause_s = FIRST_PAUSE_S
 
-    def run(self) -> R:
+    def run(self) -> A:
         replicas, stage = self.bus.replicas, self.endpoint.stage
         while True:
             instance = self._next_instance()
@@ -180,7 +202,7 @@ class _Attempts(Generic[Q, R]):
                 raise Unavailable(f"has no live replica at {self.bus.endpoint}, {self._history()}", where=stage)
         raise DeadlineExceeded(f"no answer {self._history()}", where=stage)
 
-    def _ask(self, instance: str) -> R:
+    def _ask(self, instance: str) -> A:
         key = self.endpoint.instance_key(instance)
         timeout_s = max(0.0, self.envelope.remaining_s()) + REPLY_GRACE_S
         for reply in self.bus._get(key, self.payload, attachment=self.attachment, timeout_s=timeout_s):
@@ -190,14 +212,14 @@ class _Attempts(Generic[Q, R]):
                 raise self._error(reply.err, key, timeout_s)
         raise _Lost("nothing came back")
 
-    def _answer(self, sample: zenoh.Sample, key: str) -> R:
+    def _answer(self, sample: zenoh.Sample, key: str) -> A:
         """A reply, if it is one to this request."""
         about = b"" if sample.attachment is None else sample.attachment.to_bytes()
         if str(sample.key_expr) != key or about != self.envelope.request_id.encode():
             whose = f"under {str(sample.key_expr)!r} to request {about[:MOST_ID_CHARACTERS]!r}"
             raise _Failed(f"{key} replied {whose}, not to {self.envelope.request_id!r}", WRONG)
         try:
-            return codec.decode(sample.payload.to_bytes(), self.endpoint.reply)
+            return self.read(sample.payload.to_bytes())
         except InvalidMission as error:
             raise _Failed(f"{key} replied what is no answer: {error}", WRONG) from error
 

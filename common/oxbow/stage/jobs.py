@@ -24,7 +24,7 @@ from oxbow.recording import Layer, Show, Stamped, discard
 from oxbow.stage.wire import Described, Done, Failed, FromWorker, Job, Shown
 from oxbow.stage.worker import needs_memory
 
-__all__ = ["serve"]
+__all__ = ["is_memory_error", "serve"]
 
 _log = logging.getLogger(__name__)
 
@@ -85,7 +85,7 @@ class _Adapter:
         """What to answer: the other kinds of `OxbowError` are about the bus, and no handler's to raise."""
         if isinstance(error, InvalidMission | Infeasible | Internal):
             return error
-        if _is_want_of_memory(error):
+        if is_memory_error(error):
             _log.error("%s: request %s needs more than %d MB", self.endpoint.stage, request_id, self.memory_mb)
             return needs_memory(self.memory_mb, self.endpoint.stage)
         _log.error("%s: request %s failed", self.endpoint.stage, request_id, exc_info=error)
@@ -115,7 +115,8 @@ class _Adapter:
         return show
 
 
-def _is_want_of_memory(error: BaseException) -> bool:
+def is_memory_error(error: BaseException) -> bool:
+    """Whether an exception means that there was no memory left."""
     return isinstance(error, MemoryError) or (isinstance(error, ShapelyError) and "bad_alloc" in str(error))
 
 

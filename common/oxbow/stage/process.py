@@ -15,7 +15,7 @@ import sys
 import threading
 from multiprocessing.connection import Connection
 
-__all__ = ["main"]
+__all__ = ["guard", "main"]
 
 _PR_SET_PDEATHSIG = 1
 
@@ -23,16 +23,29 @@ _PR_SET_PDEATHSIG = 1
 def main(argv: list[str]) -> None:
     """Serve jobs until the session process closes the pipe or dies."""
     fd, endpoint, handler, instance, memory_mb = argv
-    # Signals to the process group are the session process's business: it drains, then closes the pipe.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    _end_with_parent(int(fd))
-    _limit_memory(int(memory_mb))
-    logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s")
+    guard(int(fd), int(memory_mb))
 
     from oxbow.stage.jobs import serve  # noqa: PLC0415 - brings numpy, shapely and the handler, under the limit
 
     serve(Connection(int(fd)), endpoint, handler, instance, int(memory_mb))
+
+
+def guard(fd: int, memory_mb: int) -> None:
+    """Prepare a process that works for the one at the other end of a pipe.
+
+    Parameters
+    ----------
+    fd
+        The pipe: when it is hung up, this process ends.
+    memory_mb
+        What this process may take.
+    """
+    # Signals to the process group are the other process's business: it drains, then closes the pipe.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    _end_with_parent(fd)
+    _limit_memory(memory_mb)
+    logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s")
 
 
 def _end_with_parent(fd: int) -> None:

@@ -17,7 +17,15 @@ from oxbow.errors import DeadlineExceeded, Infeasible, OxbowError, Unavailable
 from oxbow.stage.watch import STOPPED_S, Verdict, Watch, is_stopped
 from oxbow.stage.wire import MOST_MESSAGE_BYTES, Described, Done, Failed, FromWorker, Job, Shown
 
-__all__ = ["DEFAULT_MEMORY_MB", "Worker", "WorkerLost", "needs_memory"]
+__all__ = [
+    "DEFAULT_MEMORY_MB",
+    "Worker",
+    "WorkerLost",
+    "ended",
+    "is_want_of_memory",
+    "needs_memory",
+    "one_threaded",
+]
 
 DEFAULT_MEMORY_MB = 4096
 START_S = 30.0
@@ -138,7 +146,7 @@ class Worker:
                 pass_fds=[fd],
                 stdin=subprocess.DEVNULL,
                 stdout=2,  # what a handler prints is no data
-                env=_one_threaded(),
+                env=one_threaded(),
             )
 
     @contextmanager
@@ -180,10 +188,9 @@ class Worker:
             return WorkerLost(f"worker process {self.pid} closed its pipe, or sent garbage", where=self.handler)
         finally:
             self._kill()
-        if status in _FAULTS and watch.data_bytes > _FULL_SHARE * self.memory_mb * 2**20:
+        if is_want_of_memory(status, watch.data_bytes, self.memory_mb):
             return needs_memory(self.memory_mb, self.handler)
-        cause = f"by {_signal_name(-status)}" if status < 0 else f"with status {status}"
-        return WorkerLost(f"worker process {self.pid} ended {cause}", where=self.handler)
+        return WorkerLost(f"worker process {self.pid} {ended(status)}", where=self.handler)
 
     def _kill(self) -> None:
         self._pipe.close()
@@ -198,6 +205,16 @@ def needs_memory(memory_mb: int, where: str) -> Infeasible:
     )
 
 
+def is_want_of_memory(status: int, data_bytes: int, memory_mb: int) -> bool:
+    """Whether a process that ended with this status, when it had so much memory, has died of its limit."""
+    return status in _FAULTS and data_bytes > _FULL_SHARE * memory_mb * 2**20
+
+
+def ended(status: int) -> str:
+    """How a process ended."""
+    return f"ended by {_signal_name(-status)}" if status < 0 else f"ended with status {status}"
+
+
 def _signal_name(number: int) -> str:
     try:
         return signal.Signals(number).name
@@ -205,7 +222,7 @@ def _signal_name(number: int) -> str:
         return f"signal {number}"
 
 
-def _one_threaded() -> dict[str, str]:
+def one_threaded() -> dict[str, str]:
     """An environment in which linear algebra takes one thread: results must not depend on the number of cores."""
     threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     return {**threads, **os.environ}

@@ -1,0 +1,27 @@
+"""What a checking helper process does: it reads a request and checks its geometry."""
+
+from __future__ import annotations
+
+import msgspec
+
+from oxbow.site import Site
+from oxbow.submission import Submission
+from oxbow_mission.peer import Peer
+from oxbow_mission.wire import Check, Checked, FromHelper, ToHelper
+
+__all__ = ["check"]
+
+
+def check(order: ToHelper, _peer: Peer) -> FromHelper:
+    """Check all of a request, so that its sender hears of every fault at once."""
+    assert isinstance(order, Check)
+    submission = Submission.parse(order.document, order.parameters)
+    Site.of(submission.mission)
+    return Checked(
+        mission_id=submission.mission_id,
+        client=submission.parameters.client,
+        document=submission.document,
+        parameters=msgspec.json.encode(submission.parameters),
+        fingerprint=submission.fingerprint,
+        deadline_s=submission.parameters.deadline_s,
+    )

@@ -1,0 +1,50 @@
+"""The mission service, as a helper process sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+
+import msgspec
+
+from oxbow_mission.wire import Answer, Ask, FromHelper, ToHelper
+
+__all__ = ["Handler", "HungUp", "Peer"]
+
+
+class HungUp(BaseException):
+    """The mission service is gone, or wants no more of this process: no handler is to deal with it."""
+
+
+class Peer:
+    """The mission service at the other end of a pipe; every method raises `HungUp` where there is none."""
+
+    def __init__(self, pipe: Connection) -> None:
+        self._pipe = pipe
+
+    def send(self, message: FromHelper) -> None:
+        """Say something."""
+        try:
+            self._pipe.send_bytes(msgspec.msgpack.encode(message))
+        except OSError as error:
+            raise HungUp from error
+
+    def receive(self) -> ToHelper:
+        """Wait for an order, or for the answer to what was asked."""
+        try:
+            data = self._pipe.recv_bytes()
+        except (EOFError, OSError) as error:
+            raise HungUp from error
+        message: ToHelper = msgspec.msgpack.decode(data, type=ToHelper)
+        return message
+
+    def ask(self, ask: Ask) -> Answer:
+        """Ask a stage, by way of the mission service, which has the bus."""
+        self.send(ask)
+        answer = self.receive()
+        assert isinstance(answer, Answer)
+        return answer
+
+
+Handler = Callable[[ToHelper, Peer], FromHelper]
+"""Carries out an order."""
