@@ -151,10 +151,12 @@ class Shore:
         return _merged(np.vstack(found))
 
     def _leg_lengths(self, unsafe: FloatArray, total_m: float) -> tuple[float, float]:
-        """How far a path's first and its last leg reach."""
-        open_m = OPEN_SHARE * self.safety_m
-        out_m = _reach_m(unsafe, open_m)
-        return out_m, min(_reach_m(total_m - unsafe[::-1, ::-1], open_m), total_m - out_m)
+        """How far a path's first and its last leg reach; a path that never comes to open water has none."""
+        for open_m in (OPEN_SHARE * self.safety_m, 0.0):
+            out_m, home_m = _reach_m(unsafe, open_m), _reach_m(total_m - unsafe[::-1, ::-1], open_m)
+            if out_m + home_m < total_m:
+                return out_m, home_m
+        return 0.0, 0.0
 
     def _leg(self, end: _End, path: LineString, outside: FloatArray, unsafe: FloatArray) -> Leg:
         """A leg, and what its place makes necessary."""
@@ -185,7 +187,7 @@ class Shore:
         goal = shapely.union_all([*basins, path.interpolate(end.open_m).buffer(self.safety_m).intersection(water)])
         if goal.is_empty or goal.covers(Point(start)):
             return 0.0
-        routes = Routes(water)
+        routes = Routes(water, self.safety_m)
         route = routes.to_area(start, goal, routes.goals_in(goal))
         return 0.0 if route is None else float(route.difference(goal).length)
 

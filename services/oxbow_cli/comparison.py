@@ -115,8 +115,9 @@ def _differences(first: Mission, second: Mission) -> Iterator[str]:
 def _broken_rules(found: Evaluation) -> Iterator[str]:
     if not found.is_simple:
         yield f"crosses itself ({found.crossings})"
-    if found.outside_m > EQUAL_M:
-        yield f"{found.outside_m:.1f} m outside"
+    necessary_m = sum(min(leg.ashore_m, leg.least_ashore_m) for path in found.vehicles for leg in path.legs)
+    if found.outside_m - necessary_m > EQUAL_M:
+        yield f"{found.outside_m - necessary_m:.1f} m outside"
     if found.unsafe_m > EQUAL_M:
         yield f"{found.unsafe_m:.1f} m within Safety"
     if found.length_ratio > 1.0:

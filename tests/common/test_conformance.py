@@ -1,0 +1,124 @@
+"""Legs and faults of paths: what launch and recovery make necessary, and what exceeds it."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import LineString, Polygon, affinity, box
+
+from oxbow.conformance import Shore
+from oxbow.contracts import Rule
+
+LAKE = box(0, 0, 400, 200)
+SAFETY_M = 10.0
+
+
+def conduct(path, water=LAKE, safety_m=SAFETY_M):
+    line = LineString(path)
+    return Shore(water, safety_m).conduct(line, line.coords[0], line.coords[-1])
+
+
+def rules(found):
+    return [fault.rule for fault in found.faults]
+
+
+def test_a_path_in_open_water_has_no_legs_and_no_faults():
+    found = conduct([(20, 20), (380, 20), (380, 180)])
+    assert found.faults == ()
+    assert [leg.unsafe_m for leg in found.legs] == [0.0, 0.0]
+
+
+def test_a_launch_ashore_makes_its_own_distance_over_land_necessary():
+    found = conduct([(-8, 100), (50, 100), (50, 150)])
+    assert found.faults == ()
+    assert found.outside_m == pytest.approx(8.0, abs=0.02)
+    leg = found.legs[0]
+    assert (leg.ashore_m, leg.least_ashore_m) == pytest.approx((8.0, 8.0), abs=0.02)
+    assert leg.unsafe_m == pytest.approx(17.9, abs=0.05)
+
+
+def test_a_slanting_way_over_land_exceeds_what_is_necessary():
+    found = conduct([(-8, 100), (20, 150), (50, 150)])
+    assert rules(found) == [Rule.OUTSIDE]
+    assert found.faults[0].leg == "launch"
+
+
+def test_no_leg_excuses_what_happens_between_the_legs():
+    zone = LAKE.difference(box(180, 0, 220, 120))
+    found = conduct([(5, 60), (200, 60), (395, 60)], zone)
+    assert rules(found) == [Rule.OUTSIDE, Rule.UNSAFE]
+    assert found.outside_m == pytest.approx(40.0, abs=0.02)
+    assert found.unsafe_m == pytest.approx(60.0, abs=0.3)
+
+
+CREEK = shapely.union_all([LAKE, box(400, 90, 700, 100), box(690, 90, 700, 190)])
+
+
+def test_a_creek_is_as_long_as_it_is():
+    found = conduct([(695, 185), (695, 95), (380, 95), (380, 20)], CREEK)
+    assert found.faults == ()
+    assert found.legs[0].unsafe_m == pytest.approx(90 + 305, abs=15)
+
+
+def test_a_leg_along_an_open_shore_is_too_long():
+    found = conduct([(5, 5), (5, 195), (50, 150)])
+    assert rules(found) == [Rule.UNSAFE]
+    assert found.faults[0].leg == "launch"
+    assert found.unsafe_m > 100
+
+
+def test_a_strait_between_basins_is_no_leg():
+    water = shapely.union_all([box(0, 0, 100, 100), box(100, 45, 160, 55), box(160, 0, 400, 100)])
+    found = conduct([(2, 50), (350, 50)], water)
+    assert rules(found) == [Rule.UNSAFE]
+    assert found.faults[0].leg == ""
+    x, y = found.faults[0].place
+    assert 90 < x < 170
+    assert y == pytest.approx(50)
+
+
+def test_a_basin_that_is_passed_ends_the_leg():
+    """A detour over the basin's rim would have the whole way be a leg: the nearest open water is what counts."""
+    water = shapely.union_all([box(0, 0, 100, 100), box(100, 0, 160, 10), box(160, 0, 400, 100)])
+    found = conduct([(2, 5), (165, 5), (200, 50)], water)
+    assert rules(found) == [Rule.UNSAFE]
+
+
+def test_without_a_safety_distance_the_shore_itself_is_in():
+    assert conduct([(0, 0), (400, 0), (400, 200)], safety_m=0.0).faults == ()
+    assert rules(conduct([(20, 20), (420, 20), (420, 40), (380, 40)], safety_m=0.0)) == [Rule.OUTSIDE, Rule.UNSAFE]
+
+
+def test_a_path_that_never_enters_the_water_is_outside():
+    found = conduct([(500, 0), (600, 0)])
+    assert found.outside_m == pytest.approx(100.0)
+    assert Rule.OUTSIDE in rules(found)
+
+
+@settings(deadline=None, max_examples=40, derandomize=True)
+@given(
+    st.lists(st.tuples(st.floats(-60, 460), st.floats(-60, 260)), min_size=2, max_size=8, unique=True),
+    st.floats(0.0, 6.28),
+)
+def test_metres_are_those_of_the_overlay_and_do_not_depend_on_the_frame(points, angle_rad):
+    water = LAKE.difference(shapely.Point(200, 100).buffer(40))
+    path = LineString(points)
+    if path.length < 1.0:
+        return
+    found = conduct(points, water)
+    assert found.outside_m == pytest.approx(path.difference(water.buffer(0.01)).length, abs=0.05)
+    turned, turned_water = (affinity.rotate(each, angle_rad, (0, 0), use_radians=True) for each in (path, water))
+    again = Shore(turned_water, SAFETY_M).conduct(turned, turned.coords[0], turned.coords[-1])
+    assert again.outside_m == pytest.approx(found.outside_m, abs=0.05)
+    legs = [leg.unsafe_m for leg in found.legs]
+    assert [leg.unsafe_m for leg in again.legs] == pytest.approx(legs, abs=0.1)
+
+
+def test_a_ragged_shore_of_many_points_is_judged_as_it_stands():
+    angles = np.linspace(0, 2 * np.pi, 20_001)[:-1]
+    radius = 1000 + 20 * np.sin(313 * angles)
+    water = Polygon(np.column_stack([radius * np.cos(angles), radius * np.sin(angles)]))
+    ring = shapely.Point(0, 0).buffer(975 - SAFETY_M).exterior
+    assert conduct(ring.coords, water).faults == ()
+    assert Rule.UNSAFE in rules(conduct(shapely.Point(0, 0).buffer(985).exterior.coords, water))

@@ -1,0 +1,141 @@
+"""Replies that do not belong to their requests, and certificates that lie: none of them sends a boat anywhere."""
+
+import json
+
+import msgspec
+import numpy as np
+import pytest
+import shapely
+from shapely import LineString, affinity
+
+from oxbow.contracts import ASSIGN, CERTIFY, CONTOUR, DECOMPOSE, PATH, Method
+from oxbow.errors import Internal
+from oxbow.frame import Frame
+from oxbow.mission import parse_mission
+from oxbow.pipeline import plan_mission
+from oxbow.plan import PlanOptions
+from oxbow_cli.local import local_call
+
+FRAME = Frame(lat=46.0, long=2.0)
+OPTIONS = PlanOptions(method=Method.TRANSECT)
+replace = msgspec.structs.replace
+
+
+def at(x_m, y_m):
+    long, lat = FRAME.to_degrees(np.array([(x_m, y_m)])).tolist()[0]
+    return {"lat": lat, "long": long}
+
+
+def pond(**changes):
+    fields = {
+        "MissionType": "map",
+        "LaunchPoint": at(20, 20),
+        "BoundingBox": [at(*corner) for corner in ((0, 0), (400, 0), (400, 200), (0, 200))],
+        "ForbiddenZones": [[at(*corner) for corner in ((180, 80), (220, 80), (220, 120), (180, 120))]],
+        "Safety": 5.0,
+        "Master_length": 4000.0,
+    }
+    return parse_mission(json.dumps(fields | changes).encode())
+
+
+FLEET = [{"Name": name, "Role": "master", "Length": 2000.0} for name in "ab"]
+
+
+class Lying:
+    """Stages of which some reply other than they should."""
+
+    def __init__(self, **changed):
+        self.changed = changed
+        self.call = local_call()
+
+    def __call__(self, endpoint, request, /, *, part=""):
+        reply = self.call(endpoint, request, part=part)
+        change = self.changed.get(endpoint.stage)
+        return reply if change is None else change(request, reply)
+
+
+def moved(geometry, east_m):
+    return affinity.translate(geometry, east_m, 0.0)
+
+
+def ends_kept(path, change):
+    xy = shapely.get_coordinates(path)
+    xy[1:-1] = change(xy[1:-1])
+    return LineString(xy)
+
+
+def off_the_lake(_request, reply):
+    return replace(reply, path=ends_kept(reply.path, lambda xy: xy * 0.5 + (0.0, 200.0)))
+
+
+def through_the_island(_request, reply):
+    xy = shapely.get_coordinates(reply.path)
+    x, y = xy.mean(axis=0)
+    return replace(reply, path=LineString([xy[0], (x, y - 5), (x + 170, y), (x, y + 5), xy[-1]]))
+
+
+def praised(_request, reply):
+    """A certificate that finds no fault, of the right request."""
+    return replace(reply, faults=(), outside_m=0.0, unsafe_m=0.0, crossings=0, is_simple=True)
+
+
+FALSE = {
+    "free space off the lake": ({CONTOUR.stage: lambda _, r: replace(r, free=moved(r.free, 350.0))}, "contour"),
+    "free space over an island": (
+        {CONTOUR.stage: lambda _, r: replace(r, free=shapely.Polygon(r.free.exterior))},
+        "contour",
+    ),
+    "cells of another lake": (
+        {
+            DECOMPOSE.stage: lambda _, r: replace(
+                r, cells=tuple(replace(c, floor=c.floor + 300.0, ceiling=c.ceiling + 300.0) for c in r.cells)
+            )
+        },
+        "decomposition",
+    ),
+    "path of another launch": ({PATH.stage: lambda _, r: replace(r, path=moved(r.path, 30.0))}, "path"),
+    "path too long": (
+        {PATH.stage: lambda q, r: replace(r, path=affinity.scale(r.path, 1.5, 1.5, origin=q.launch))},
+        "path",
+    ),
+    "path off the lake": ({PATH.stage: off_the_lake}, "path"),
+    "path off the lake, praised": ({PATH.stage: off_the_lake, CERTIFY.stage: praised}, "path"),
+    "path through the island, praised": ({PATH.stage: through_the_island, CERTIFY.stage: praised}, "path"),
+    "certificate of another path": (
+        {CERTIFY.stage: lambda _, r: replace(r, request_digest="0" * 64)},
+        "certificate",
+    ),
+}
+
+
+@pytest.mark.parametrize(("changed", "where"), FALSE.values(), ids=FALSE.keys())
+def test_a_false_stage_sends_no_boat_anywhere(changed, where):
+    with pytest.raises(Internal) as raised:
+        plan_mission(pond(), OPTIONS, call=Lying(**changed))
+    assert raised.value.where == where
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda share: replace(share, area=moved(share.area, 300.0)),
+        lambda share: replace(share, vehicle="nobody"),
+    ],
+    ids=["off the lake", "a stranger's"],
+)
+def test_a_false_share_is_refused(change):
+    lying = Lying(**{ASSIGN.stage: lambda _, r: replace(r, shares=(*r.shares[:-1], change(r.shares[-1])))})
+    with pytest.raises(Internal) as raised:
+        plan_mission(pond(Vehicles=FLEET), OPTIONS, call=lying)
+    assert raised.value.where == "assignment"
+
+
+def test_the_error_names_the_vehicle_the_place_and_the_metres():
+    lying = Lying(**{PATH.stage: off_the_lake, CERTIFY.stage: praised})
+    with pytest.raises(Internal, match=r"a: path: .* m outside the water.*, at lat 46\.00\d+, long 2\.00\d+"):
+        plan_mission(pond(Vehicles=FLEET), OPTIONS, call=lying)
+
+
+def test_the_truth_passes():
+    completed = plan_mission(pond(Vehicles=FLEET), OPTIONS, call=Lying())
+    assert all(len(vehicle.certificate.legs) == 2 for vehicle in completed.plan.fleet.vehicles)
