@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,7 +10,7 @@ import shapely
 from shapely import MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.contours import Contour, Zone, danger_zones, forbidden_zones
+from oxbow.contours import MAX_RADIUS_M, Contour, Zone, danger_zones, forbidden_zones, require_points
 from oxbow.contracts import DANGER_DETOUR_M, DangerZone, FloatArray, HotSpot, Place, Role, WeightedArea
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.fleet import Member, members
@@ -23,8 +22,6 @@ from oxbow.weights import weighted_areas
 
 __all__ = ["Site"]
 
-MAX_RADIUS_M = 300_000.0
-"""How far a site may reach from the mean of its contour's points, and a launch point may lie from the water."""
 ON_SHORE_M = 1.0
 """A vehicle's start no farther than this from the water is on its shore."""
 
@@ -96,9 +93,10 @@ class Site:
         Infeasible
             The forbidden zones cover all of the water.
         """
+        require_points(mission)
         contour = Contour.of(mission.outline_name, mission.outline)
         frame = Frame.around(contour.degrees)
-        outline = _outline(contour, frame)
+        outline = contour.outline(frame)
         shapely.prepare(outline)
         forbidden = forbidden_zones(mission, frame, outline)
         zones = tuple(part for zone in forbidden for part in zone.parts)
@@ -138,21 +136,6 @@ class Site:
         )
 
 
-def _outline(contour: Contour, frame: Frame) -> Polygon:
-    polygon = contour.planar(frame)
-    radius_m = np.hypot(*shapely.get_coordinates(polygon).T)
-    if radius_m.max() > MAX_RADIUS_M:
-        farthest = int(np.argmax(radius_m[:-1]))
-        raise InvalidMission(
-            f"is {radius_m.max() / 1000:.0f} km from the mean of the points;"
-            f" expected a site that reaches at most {MAX_RADIUS_M / 1000:.0f} km from there",
-            where=f"{contour.name}[{contour.indices[farthest]}]",
-        )
-    if not polygon.is_valid:
-        raise _crossing(contour, frame, polygon)
-    return shapely.normalize(polygon)
-
-
 def _water(outline: Polygon, zones: Sequence[Polygon]) -> Polygon | MultiPolygon:
     """The outline less the zones, without what has no area."""
     if not zones:
@@ -160,22 +143,6 @@ def _water(outline: Polygon, zones: Sequence[Polygon]) -> Polygon | MultiPolygon
     parts = shapely.get_parts(outline.difference(shapely.union_all(zones)))
     water = [part for part in parts if isinstance(part, Polygon) and part.area > 0.0]
     return water[0] if len(water) == 1 else MultiPolygon(water)
-
-
-def _crossing(contour: Contour, frame: Frame, polygon: Polygon) -> InvalidMission:
-    """Where an outline meets itself, and which of its edges do."""
-    x, y = map(float, re.findall(r"\[(\S+) (\S+)\]", shapely.is_valid_reason(polygon))[0])
-    xy = shapely.get_coordinates(polygon)
-    distance = shapely.distance(shapely.linestrings(np.stack([xy[:-1], xy[1:]], axis=1)), Point(x, y))
-    edges = np.sort(np.argsort(distance, kind="stable")[:2])
-    following = np.roll(contour.indices, -1)
-    one, other = (f"the edge from point {contour.indices[edge]} to {following[edge]}" for edge in edges)
-    long, lat = frame.to_degrees(np.array([[x, y]]))[0]
-    return InvalidMission(
-        f"meets itself at lat {lat:.7f}, long {long:.7f}, where {one} meets {other};"
-        " expected a contour that neither crosses nor touches itself",
-        where=f"{contour.name}[{contour.indices[edges[0]]}]",
-    )
 
 
 def _dangerous(mission: Mission, zones: Sequence[Zone]) -> tuple[DangerZone, ...]:
