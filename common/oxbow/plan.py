@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from oxbow.contracts import (
     MOST_DEADLINE_S,
+    MOST_SEED,
     Conformance,
     Draw,
     LeftSpot,
@@ -26,9 +27,6 @@ __all__ = [
     "TreatmentRecord",
     "VehicleRecord",
 ]
-
-MOST_SEED = 2**53
-"""Every JSON reader has integers up to here exactly."""
 
 
 class PlanOptions(Message, frozen=True, kw_only=True):

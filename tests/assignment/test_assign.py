@@ -213,9 +213,9 @@ def test_vehicles_without_a_route_between_them_each_serve_their_side():
 @pytest.mark.parametrize(
     ("fields", "says"),
     [
-        ({"length_m": 0.0}, "vehicle 'boat': length_m: is 0.0 m; expected a finite number > 0"),
-        ({"length_m": np.inf}, "vehicle 'boat': length_m: is inf m"),
-        ({"speed_mps": -1.0}, "vehicle 'boat': speed_mps: is -1.0 m/s"),
+        ({"length_m": 0.0}, "vehicle 'boat': length_m: is 0.0; expected a finite number, > 0"),
+        ({"length_m": np.inf}, "vehicle 'boat': length_m: is inf"),
+        ({"speed_mps": -1.0}, "vehicle 'boat': speed_mps: is -1.0"),
         ({"start": (np.nan, 0.0)}, "vehicle 'boat': start: is \\(nan, 0.0\\)"),
         ({"name": ""}, "name: is empty"),
     ],

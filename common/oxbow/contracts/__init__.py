@@ -45,7 +45,17 @@ from oxbow.contracts.keys import (
     live_service,
     mission_key,
 )
-from oxbow.contracts.message import FloatArray, Message, Place, require_area, require_finite
+from oxbow.contracts.message import (
+    MOST_LENGTH_M,
+    MOST_SEED,
+    FloatArray,
+    Message,
+    Place,
+    require_area,
+    require_finite,
+    require_line,
+    require_place,
+)
 from oxbow.contracts.missions import DEFAULT_DEADLINE_S, MOST_DEADLINE_S, MissionState, MissionStatus
 from oxbow.contracts.path import Draw, Method, PathPlan, PathRequest, SpacingStep, WeightedArea
 from oxbow.contracts.stages import ASSIGN, CERTIFY, CONTOUR, DECOMPOSE, MAX_REQUEST_BYTES, PATH, STAGES, Endpoint
@@ -63,6 +73,8 @@ __all__ = [
     "INTROSPECTION",
     "MAX_REQUEST_BYTES",
     "MOST_DEADLINE_S",
+    "MOST_LENGTH_M",
+    "MOST_SEED",
     "PATH",
     "PLAN_KEY",
     "PREFIX",
@@ -119,4 +131,6 @@ __all__ = [
     "mission_key",
     "require_area",
     "require_finite",
+    "require_line",
+    "require_place",
 ]

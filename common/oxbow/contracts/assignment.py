@@ -8,8 +8,19 @@ import math
 from shapely import LineString, Polygon
 
 from oxbow.contracts.danger import DANGER_DETOUR_M, DangerZone
-from oxbow.contracts.message import Message, Place, require_area, require_finite
-from oxbow.errors import InvalidMission
+from oxbow.contracts.message import (
+    MOST_LENGTH_M,
+    MOST_SEED,
+    Message,
+    Place,
+    require_area,
+    require_finite,
+    require_line,
+    require_place,
+)
+from oxbow.errors import InvalidMission, renamed
+from oxbow.ids import MOST_ID_CHARACTERS, excerpt
+from oxbow.tolerances import FARTHEST_M
 
 __all__ = ["AssignRequest", "Assignment", "HotSpot", "LeftSpot", "Role", "Share", "Sortie", "Vehicle"]
 
@@ -57,23 +68,14 @@ class Vehicle(Message, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         if not self.name:
             raise InvalidMission("is empty; expected a name for every vehicle", where="name")
-        for field, unit in (("speed_mps", "m/s"), ("length_m", "m")):
-            value = getattr(self, field)
-            if not (math.isfinite(value) and value > 0.0):
-                raise InvalidMission(
-                    f"is {value!r} {unit}; expected a finite number > 0", where=f"vehicle {self.name!r}: {field}"
-                )
-        if not 1.0 <= self.danger_factor < math.inf:
+        if len(self.name) > MOST_ID_CHARACTERS:
             raise InvalidMission(
-                f"is {self.danger_factor!r}; expected a finite number >= 1",
-                where=f"vehicle {self.name!r}: danger_factor",
+                f"is {excerpt(self.name)}; expected at most {MOST_ID_CHARACTERS} characters", where="name"
             )
-        for field in ("start", "recovery"):
-            if not all(map(math.isfinite, getattr(self, field))):
-                raise InvalidMission(
-                    f"is {getattr(self, field)!r}; expected two finite numbers",
-                    where=f"vehicle {self.name!r}: {field}",
-                )
+        with renamed({field: f"vehicle {self.name!r}: {field}" for field in self.__struct_fields__}):
+            require_finite(self, "speed_mps", "length_m", above=0.0, most=MOST_LENGTH_M)
+            require_finite(self, "danger_factor", least=1.0)
+            require_place(self, "start", "recovery")
 
 
 class HotSpot(Message, frozen=True, kw_only=True):
@@ -127,9 +129,10 @@ class AssignRequest(Message, frozen=True, kw_only=True):
     seed: int = 0
 
     def __post_init__(self) -> None:
-        require_area(self, "free")
-        require_finite(self, "footprint_m", "swath_m", above=0.0)
-        require_finite(self, "danger_detour_m", least=0.0)
+        require_area(self, "free", "water")
+        require_finite(self, "footprint_m", "swath_m", above=0.0, most=FARTHEST_M)
+        require_finite(self, "danger_detour_m", least=0.0, most=MOST_LENGTH_M)
+        require_finite(self, "seed", least=0, most=MOST_SEED)
         if not self.vehicles:
             raise InvalidMission("is empty; expected one vehicle or more", where="vehicles")
         names = [vehicle.name for vehicle in self.vehicles]
@@ -146,6 +149,9 @@ class Share(Message, frozen=True, kw_only=True):
     vehicle: str
     area: Polygon
 
+    def __post_init__(self) -> None:
+        require_area(self, "area")
+
 
 class Sortie(Message, frozen=True, kw_only=True):
     """One journey of a slave: from its start over hot spots, named in order, to its recovery."""
@@ -156,6 +162,10 @@ class Sortie(Message, frozen=True, kw_only=True):
     length_m: float
     duration_s: float
 
+    def __post_init__(self) -> None:
+        require_line(self, "path")
+        require_finite(self, "length_m", "duration_s", least=0.0)
+
 
 class LeftSpot(Message, frozen=True, kw_only=True):
     """A hot spot that no vehicle can treat within its range, and why; the best value for its way comes first."""
@@ -163,6 +173,9 @@ class LeftSpot(Message, frozen=True, kw_only=True):
     hot_spot: str
     value_per_m: float
     reason: str
+
+    def __post_init__(self) -> None:
+        require_finite(self, "value_per_m")
 
 
 class Assignment(Message, frozen=True, kw_only=True):
@@ -197,3 +210,9 @@ class Assignment(Message, frozen=True, kw_only=True):
     makespan_s: float = 0.0
     joint_gap: float | None = None
     warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        require_finite(self, "imbalance", "makespan_s", least=0.0)
+        require_finite(self, "joint_gap")
+        if not all(0.0 <= share < math.inf for share in self.treated_share):
+            raise InvalidMission(f"is {self.treated_share!r}; expected numbers from 0", where="treated_share")

@@ -8,8 +8,9 @@ import math
 from shapely import LineString, Polygon
 
 from oxbow.contracts.danger import DangerZone
-from oxbow.contracts.message import Message, Place, require_area, require_finite
+from oxbow.contracts.message import Message, Place, require_area, require_finite, require_line, require_place
 from oxbow.errors import InvalidMission
+from oxbow.tolerances import FARTHEST_M
 
 __all__ = [
     "Certificate",
@@ -64,6 +65,8 @@ class Track(Message, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         require_finite(self, "speed_mps", above=0.0)
+        require_place(self, "launch", "recovery")
+        require_line(self, "path")
         if not (0 < self.path.length < math.inf):
             raise InvalidMission(
                 f"is {self.path.length!r} m long; expected a path of finite length > 0", where="path"
@@ -88,8 +91,8 @@ class CertifyRequest(Track, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_area(self, "outline")
-        require_finite(self, "safety_m", least=0.0)
+        require_area(self, "outline", "zones", "areas")
+        require_finite(self, "safety_m", least=0.0, most=FARTHEST_M)
 
     @property
     def tracks(self) -> tuple[Track, ...]:
@@ -117,6 +120,10 @@ class Fault(Message, frozen=True, kw_only=True):
     count: int = 0
     leg: str = ""
     track: int = 0
+
+    def __post_init__(self) -> None:
+        require_place(self, "place")
+        require_finite(self, "metres", "count", "track", least=0.0)
 
 
 class Leg(Message, frozen=True, kw_only=True):
@@ -148,6 +155,9 @@ class Conformance(Message, frozen=True, kw_only=True):
     unsafe_m: float
     danger: float | None = None
     legs: tuple[Leg, ...] = ()
+
+    def __post_init__(self) -> None:
+        require_finite(self, *(name for name in self.__struct_fields__ if isinstance(getattr(self, name), float)))
 
 
 class Measures(Conformance, frozen=True, kw_only=True):
@@ -183,6 +193,12 @@ class Measures(Conformance, frozen=True, kw_only=True):
     kriging_variance_mean: float | None = None
     kriging_variance_max: float | None = None
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        low_m, high_m = self.cover_radius_m
+        if not 0.0 <= low_m <= high_m < math.inf:
+            raise InvalidMission(f"is {self.cover_radius_m!r}; expected 0 <= low <= high", where="cover_radius_m")
+
 
 class Certificate(Measures, frozen=True, kw_only=True):
     """The measures of a path, and the place of the free space that is farthest from it.
@@ -196,3 +212,7 @@ class Certificate(Measures, frozen=True, kw_only=True):
     worst_gap: Place | None = None
     tracks: tuple[Conformance, ...] = ()
     faults: tuple[Fault, ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_place(self, "worst_gap")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from shapely import Polygon
 
-from oxbow.contracts.message import Message, Place, require_area, require_finite
+from oxbow.contracts.message import MOST_LENGTH_M, Message, Place, require_area, require_finite, require_place
+from oxbow.tolerances import FARTHEST_M
 
 __all__ = ["ContourRequest", "DroppedPart", "FreeSpace"]
 
@@ -16,6 +17,11 @@ class DroppedPart(Message, frozen=True, kw_only=True):
     reason: str
     place: Place
     outline: Polygon
+
+    def __post_init__(self) -> None:
+        require_finite(self, "area_m2", least=0.0)
+        require_place(self, "place")
+        require_area(self, "outline")
 
 
 class ContourRequest(Message, frozen=True, kw_only=True):
@@ -33,9 +39,9 @@ class ContourRequest(Message, frozen=True, kw_only=True):
     tolerance_m: float | None = None
 
     def __post_init__(self) -> None:
-        require_area(self, "outline")
-        require_finite(self, "safety_m", "tolerance_m", least=0.0)
-        require_finite(self, "spacing_m", above=0.0)
+        require_area(self, "outline", "zones")
+        require_finite(self, "safety_m", "tolerance_m", least=0.0, most=FARTHEST_M)
+        require_finite(self, "spacing_m", above=0.0, most=MOST_LENGTH_M)
 
 
 class FreeSpace(Message, frozen=True, kw_only=True):
@@ -53,4 +59,6 @@ class FreeSpace(Message, frozen=True, kw_only=True):
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        require_area(self, "free")
+        require_area(self, "free", "water")
+        require_finite(self, "tolerance_m", least=0.0, most=FARTHEST_M)
+        require_finite(self, "compression", least=0.0)

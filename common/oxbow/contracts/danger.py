@@ -7,8 +7,8 @@ import math
 
 from shapely import Polygon
 
-from oxbow.contracts.message import Message
-from oxbow.errors import InvalidMission
+from oxbow.contracts.message import Message, require_area
+from oxbow.errors import InvalidMission, renamed
 
 __all__ = ["DANGER_DETOUR_M", "DangerZone", "Per"]
 
@@ -55,8 +55,8 @@ class DangerZone(Message, frozen=True, kw_only=True):
                 " forbidden zone)",
                 where=self.name,
             )
-        if self.area.is_empty or not self.area.is_valid:
-            raise InvalidMission("is empty or not a valid polygon", where=self.name)
+        with renamed({"area": self.name}):
+            require_area(self, "area")
 
     @property
     def hazard(self) -> float:

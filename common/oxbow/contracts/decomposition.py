@@ -7,8 +7,17 @@ import enum
 import numpy as np
 from shapely import Polygon
 
-from oxbow.contracts.message import FloatArray, Message, Place, require_area, require_finite
+from oxbow.contracts.message import (
+    MOST_LENGTH_M,
+    FloatArray,
+    Message,
+    Place,
+    require_area,
+    require_finite,
+    require_place,
+)
 from oxbow.errors import InvalidMission
+from oxbow.tolerances import FARTHEST_M
 
 __all__ = ["Cell", "CriticalKind", "CriticalPoint", "DecomposeRequest", "Decomposition", "HeadingScore"]
 
@@ -27,6 +36,9 @@ class CriticalPoint(Message, frozen=True, kw_only=True):
 
     kind: CriticalKind
     place: Place
+
+    def __post_init__(self) -> None:
+        require_place(self, "place")
 
 
 class Cell(Message, frozen=True, kw_only=True):
@@ -47,6 +59,11 @@ class Cell(Message, frozen=True, kw_only=True):
             chain = getattr(self, field)
             if chain.ndim != 2 or chain.shape[1] != 2 or len(chain) < 1 or (np.diff(chain[:, 0]) < 0).any():
                 raise InvalidMission("is not an (n, 2) chain with non-decreasing u", where=field)
+            if not (np.abs(chain) <= FARTHEST_M).all():
+                message = f"has coordinates that are not finite, or beyond {FARTHEST_M:g} m"
+                raise InvalidMission(message, where=field)
+        if (self.floor[[0, -1], 0] != self.ceiling[[0, -1], 0]).any():
+            raise InvalidMission("begins or ends at another u than the floor", where="ceiling")
 
 
 class HeadingScore(Message, frozen=True, kw_only=True):
@@ -54,6 +71,9 @@ class HeadingScore(Message, frozen=True, kw_only=True):
 
     heading_rad: float
     predicted_cost: float
+
+    def __post_init__(self) -> None:
+        require_finite(self, "heading_rad", "predicted_cost")
 
 
 class DecomposeRequest(Message, frozen=True, kw_only=True):
@@ -65,7 +85,7 @@ class DecomposeRequest(Message, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         require_area(self, "free")
-        require_finite(self, "spacing_m", above=0.0)
+        require_finite(self, "spacing_m", above=0.0, most=MOST_LENGTH_M)
         require_finite(self, "heading_rad")
 
 
@@ -81,3 +101,13 @@ class Decomposition(Message, frozen=True, kw_only=True):
     cells: tuple[Cell, ...]
     critical_points: tuple[CriticalPoint, ...]
     scores: tuple[HeadingScore, ...] = ()
+
+    def __post_init__(self) -> None:
+        require_finite(self, "heading_rad")
+        most = len(self.critical_points)
+        for number, cell in enumerate(self.cells):
+            if not (0 <= cell.start < most and 0 <= cell.end < most):
+                raise InvalidMission(
+                    f"joins the critical points {cell.start} and {cell.end}; there are {most}",
+                    where=f"cells[{number}]",
+                )

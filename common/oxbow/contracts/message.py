@@ -4,14 +4,35 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Iterable, Iterator
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
+import shapely
+from shapely import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from oxbow.errors import InvalidMission
+from oxbow.tolerances import FARTHEST_M
 
-__all__ = ["FloatArray", "Message", "Place", "require_area", "require_finite"]
+__all__ = [
+    "MOST_LENGTH_M",
+    "MOST_SEED",
+    "FloatArray",
+    "Message",
+    "Place",
+    "require_area",
+    "require_finite",
+    "require_line",
+    "require_place",
+]
+
+MOST_SEED = 2**53
+"""JSON readers keep whole numbers up to this exactly."""
+
+MOST_LENGTH_M = 1e9
+"""More than any vehicle travels: 25 times round the Earth."""
 
 FloatArray = npt.NDArray[np.float64]
 Place = tuple[float, float]
@@ -40,8 +61,45 @@ def require_finite(
 
 
 def require_area(message: Message, *fields: str) -> None:
-    """Check polygon fields of a message: valid, with an area."""
+    """Check fields that hold a polygon, several or none: valid, with an area, and within the plane."""
+    for where, polygon in _geometries(message, fields):
+        _require_kind(polygon, Polygon, where)
+        if polygon.is_empty or not shapely.is_valid(
+            polygon
+        ):  # not the property, which keeps the interpreter's lock
+            raise InvalidMission("is empty or not a valid polygon", where=where)
+
+
+def require_line(message: Message, *fields: str) -> None:
+    """Check fields that hold a line: not empty, and within the plane."""
+    for where, line in _geometries(message, fields):
+        _require_kind(line, LineString, where)
+        if line.is_empty:
+            raise InvalidMission("is empty; expected a line", where=where)
+
+
+def require_place(message: Message, *fields: str) -> None:
+    """Check fields that hold a place or none: within the plane."""
     for field in fields:
-        polygon = getattr(message, field)
-        if polygon.is_empty or not polygon.is_valid:
-            raise InvalidMission("is empty or not a valid polygon", where=field)
+        place = getattr(message, field)
+        if place is not None and not all(abs(coordinate) <= FARTHEST_M for coordinate in place):
+            raise InvalidMission(
+                f"is {tuple(place)!r}; expected two finite numbers within {FARTHEST_M:g} m", where=field
+            )
+
+
+def _geometries(message: Message, fields: Iterable[str]) -> Iterator[tuple[str, BaseGeometry]]:
+    """The geometries in fields of a message, and what errors call them."""
+    for field in fields:
+        value = getattr(message, field)
+        if isinstance(value, tuple):
+            yield from ((f"{field}[{number}]", geometry) for number, geometry in enumerate(value))
+        elif value is not None:
+            yield field, value
+
+
+def _require_kind(geometry: BaseGeometry, kind: type[BaseGeometry], where: str) -> None:
+    if not isinstance(geometry, kind):
+        raise InvalidMission(f"is a {type(geometry).__name__}; expected a {kind.__name__}", where=where)
+    if not (np.abs(shapely.get_coordinates(geometry)) <= FARTHEST_M).all():
+        raise InvalidMission(f"has coordinates that are not finite, or beyond {FARTHEST_M:g} m", where=where)

@@ -8,7 +8,17 @@ from shapely import LineString, Polygon
 
 from oxbow.contracts.contour import DroppedPart, FreeSpace
 from oxbow.contracts.decomposition import Decomposition
-from oxbow.contracts.message import Message, Place, require_area, require_finite
+from oxbow.contracts.message import (
+    MOST_LENGTH_M,
+    MOST_SEED,
+    Message,
+    Place,
+    require_area,
+    require_finite,
+    require_line,
+    require_place,
+)
+from oxbow.contracts.missions import MOST_DEADLINE_S
 
 __all__ = ["Draw", "Method", "PathPlan", "PathRequest", "SpacingStep", "WeightedArea"]
 
@@ -62,8 +72,11 @@ class PathRequest(Message, frozen=True, kw_only=True):
     draw: Draw = Draw.LOW_DISCREPANCY
 
     def __post_init__(self) -> None:
-        require_finite(self, "length_m", "time_limit_s", above=0.0)
-        require_finite(self, "min_spacing_m", least=0.0)
+        require_finite(self, "length_m", above=0.0, most=MOST_LENGTH_M)
+        require_finite(self, "time_limit_s", above=0.0, most=MOST_DEADLINE_S)
+        require_finite(self, "min_spacing_m", least=0.0, most=MOST_LENGTH_M)
+        require_finite(self, "seed", least=0, most=MOST_SEED)
+        require_place(self, "launch", "recovery")
 
 
 class SpacingStep(Message, frozen=True, kw_only=True):
@@ -71,6 +84,9 @@ class SpacingStep(Message, frozen=True, kw_only=True):
 
     spacing_m: float
     length_m: float
+
+    def __post_init__(self) -> None:
+        require_finite(self, "spacing_m", "length_m", least=0.0)
 
 
 class PathPlan(Message, frozen=True, kw_only=True):
@@ -81,3 +97,7 @@ class PathPlan(Message, frozen=True, kw_only=True):
     steps: tuple[SpacingStep, ...]
     dropped: tuple[DroppedPart, ...] = ()
     warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        require_line(self, "path")
+        require_finite(self, "spacing_m", least=0.0)
