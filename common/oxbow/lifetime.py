@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Callable
 from types import FrameType
 
 __all__ = ["Lifetime", "wake_with_parents_death"]
@@ -68,11 +69,11 @@ class Lifetime:
     def over(self) -> bool:
         return self._over.is_set()
 
-    def wait(self) -> None:
-        """Return once this process should end."""
+    def wait(self, meanwhile: Callable[[], object] = lambda: None) -> None:
+        """Return once this process should end; `meanwhile` is called several times a second."""
         # In slices: a signal that a thread of zenoh's takes does not wake the main thread.
         while not self._over.wait(_SLICE_S):
-            pass
+            meanwhile()
 
 
 def _end_at_once() -> None:

@@ -6,26 +6,25 @@ import argparse
 import logging
 import os
 import sys
-import threading
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 import platformdirs
 
 from oxbow.bus import DEFAULT_ENDPOINT, Session
-from oxbow.codec import decode
 from oxbow.contracts import ANY_LAYER, live_key
-from oxbow.errors import OxbowError
+from oxbow.errors import InvalidMission
 from oxbow.lifetime import Lifetime
-from oxbow.recording import Stamped
-from oxbow_recorder.address import address_of
-from oxbow_recorder.live import serve
-from oxbow_recorder.recordings import Recordings
+from oxbow_recorder.files import sweep
+from oxbow_recorder.live import LiveServer
+from oxbow_recorder.runs import Runs
 from oxbow_recorder.vitals import answer_introspection
 
 _log = logging.getLogger("oxbow_recorder")
 
 QUEUE = 4096
-"""Layers waiting to be drawn; further ones are dropped: planning never waits for a recording."""
+"""Layers waiting to be looked at, which takes microseconds."""
 
 _MOST_LOGGED = 300
 """Characters of a key and of an error that are logged: both may hold what a stranger sent."""
@@ -36,28 +35,33 @@ def main(argv: list[str] | None = None) -> None:
     options = _options(argv)
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s")
     lifetime = Lifetime(options.parent)
-    live = serve(options.live_port) if options.live_port else None
-    recordings = Recordings(options.folder, live)
-    lock = threading.Lock()
-
-    def record(key: str, payload: bytes) -> None:
-        try:
-            address_of(key, payload)
-            with lock:
-                recordings.add(decode(payload, Stamped))
-        except (OxbowError, OSError) as error:
-            _log.error("a layer on %s is not recorded: %s", key[:_MOST_LOGGED], str(error)[:_MOST_LOGGED])
-
-    session = Session.join(options.connect, lambda: lifetime.over)
-    if session is not None:
-        with session:
-            subscription = session.subscribe(ANY_LAYER, record, queue_size=QUEUE)
-            answer_introspection(session, options.instance, recordings.counts)
+    sweep(options.folder)
+    with ExitStack() as held:
+        live = held.enter_context(LiveServer(options.live_port)) if options.live_port else None
+        runs = held.enter_context(Runs(options.folder, live.address if live else None))
+        session = Session.join(options.connect, lambda: lifetime.over)
+        if session is not None:
+            held.enter_context(session)
+            session.subscribe(ANY_LAYER, partial(_record, runs), queue_size=QUEUE)
+            answer_introspection(session, options.instance, runs.counts)
             session.declare_live(live_key("recorder", options.instance))
-            lifetime.wait()
-            subscription.close()
-    with lock:
-        recordings.close()
+            lifetime.wait(partial(_tick, runs, live))
+
+
+def _record(runs: Runs, key: str, payload: bytes) -> None:
+    try:
+        runs.take(key, payload)
+    except InvalidMission as error:
+        _log.warning("a layer on %s is not recorded: %s", key[:_MOST_LOGGED], str(error)[:_MOST_LOGGED])
+
+
+def _tick(runs: Runs, live: LiveServer | None) -> None:
+    try:
+        runs.tick()
+        if live is not None:
+            live.revive()
+    except Exception:  # noqa: BLE001 - whatever it was, other runs are still recorded
+        _log.exception("something that was due is not done")
 
 
 def _options(argv: list[str] | None) -> argparse.Namespace:

@@ -11,10 +11,13 @@ from pathlib import Path
 from oxbow.errors import InvalidMission
 from oxbow_recorder.address import Run
 
-__all__ = ["part_path", "recording_path", "sweep"]
+__all__ = ["holds", "part_path", "recording_id", "recording_path", "sweep"]
 
 ABANDONED_S = 24 * 3600.0
 """A part to which nothing was added for so long is nobody's: the recorder that wrote it was killed."""
+
+_HEAD_BYTES = 2**18
+"""The part of a recording in which its id stands, after 64 KiB of blueprint."""
 
 _PART = re.compile(r"\.[A-Za-z0-9_.-]+\.part\.rrd")
 _log = logging.getLogger("oxbow_recorder")
@@ -31,6 +34,20 @@ def part_path(folder: Path, run: Run) -> Path:
     return _within(folder, f".{run.mission_id}.{digest}.part.rrd")
 
 
+def recording_id(run: Run) -> str:
+    """What viewers tell recordings apart by, which stands in the head of its file; none is a part of another."""
+    return f"{run.mission_id} ({run.run_id})"
+
+
+def holds(path: Path, run: Run) -> bool:
+    """Whether there is a recording of this very run at `path`, be it by another process."""
+    try:
+        with path.open("rb") as file:
+            return recording_id(run).encode() in file.read(_HEAD_BYTES)
+    except OSError:
+        return False
+
+
 def _within(folder: Path, name: str) -> Path:
     path = folder / name
     if path.parent.resolve() != folder.resolve():
@@ -41,7 +58,7 @@ def _within(folder: Path, name: str) -> Path:
 def sweep(folder: Path) -> None:
     """Remove what killed recorders left behind long ago."""
     oldest_s = time.time() - ABANDONED_S
-    for path in folder.iterdir():
+    for path in folder.glob(".*"):
         try:
             if _PART.fullmatch(path.name) and path.is_file() and path.stat().st_mtime < oldest_s:
                 path.unlink()

@@ -1,33 +1,63 @@
-"""A server for viewers that watch while missions are planned."""
+"""The process that serves viewers, as the recorder sees it."""
 
 from __future__ import annotations
 
 import logging
+import os
 import socket
+import subprocess
+import sys
+import time
 
-import rerun as rr
+from oxbow.closing import Closing
 
-__all__ = ["serve"]
+__all__ = ["LiveServer"]
+
+END_S = 2.0
+PAUSE_S = 5.0
+"""The least time between two starts."""
 
 _log = logging.getLogger("oxbow_recorder")
 
-MEMORY_LIMIT = "256MiB"
 
+class LiveServer(Closing):
+    """Serves viewers on loopback; on another port where the one given is taken.
 
-def serve(port: int) -> str:
-    """Serve live viewers on loopback; on another port where this one is taken.
-
-    Returns
-    -------
-    str
-        The address to give to a viewer: ``rerun ADDRESS``.
+    Attributes
+    ----------
+    address
+        What to give to a viewer: ``rerun ADDRESS``.
     """
-    if not _is_free(port):
-        _log.warning("port %d is taken; viewers are served on another", port)
-        port = _free_port()
-    address = rr.RecordingStream("oxbow").serve_grpc(grpc_port=port, server_memory_limit=MEMORY_LIMIT)
-    _log.info("watch live with: rerun %s", address)
-    return address
+
+    def __init__(self, port: int) -> None:
+        if not _is_free(port):
+            _log.warning("port %d is taken; viewers are served on another", port)
+            port = _free_port()
+        self.address = f"rerun+http://127.0.0.1:{port}/proxy"
+        self._command = [sys.executable, "-m", "oxbow_recorder.viewers", str(port), str(os.getpid())]
+        self._process = self._launch()
+
+    def revive(self) -> None:
+        """Start it again where it has ended, some time after the last start."""
+        if self._process.poll() is not None and time.monotonic() - self._started > PAUSE_S:
+            _log.error(
+                "the server for viewers ended with status %d; it is started again", self._process.returncode
+            )
+            self._process = self._launch()
+
+    def close(self) -> None:
+        """Serve no more."""
+        self._process.terminate()
+        try:
+            self._process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _launch(self) -> subprocess.Popen[bytes]:
+        self._started = time.monotonic()
+        _log.info("watch live with: rerun %s", self.address)
+        return subprocess.Popen(self._command, stdin=subprocess.DEVNULL, stdout=2)
 
 
 def _is_free(port: int) -> bool:

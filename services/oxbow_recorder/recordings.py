@@ -3,56 +3,62 @@
 from __future__ import annotations
 
 import logging
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import rerun as rr
 
+from oxbow.errors import OxbowError, Unavailable
 from oxbow.frame import Frame
 from oxbow.recording import Stamped
 from oxbow_recorder.address import Run
 from oxbow_recorder.blueprint import blueprint
 from oxbow_recorder.drawing import draw
-from oxbow_recorder.files import part_path, recording_path, sweep
-from oxbow_recorder.vitals import Counts
+from oxbow_recorder.files import part_path, recording_id, recording_path
 
 __all__ = ["Recording", "Recordings"]
 
+FLUSH_S = 5.0
+"""How long what is left of a recording may take to be written: where a disk is full, rerun may wait for ever."""
+
+_ABANDONED: list[rr.RecordingStream] = []
+"""Streams whose files could not be written: leaving one may wait for ever."""
+
 _log = logging.getLogger("oxbow_recorder")
-
-IDLE_S = 300.0
-"""A run that has shown nothing for so long is closed."""
-
-END = frozenset({"done", "failed"})
-"""Names of the mission's last layer."""
 
 
 class Recording:
-    """The recording of one run, written beside its place and moved there when it is closed.
+    """The recording of one run, written beside its place and moved there when it is finished.
 
     Parameters
     ----------
     folder
         Where the file ends up, as ``<mission>.rrd``; an older one is replaced as a whole.
-    live
+    viewers
         Address of a server that viewers watch, if there is one.
+
+    Raises
+    ------
+    Unavailable
+        The file cannot be written.
     """
 
-    def __init__(self, folder: Path, run: Run, live: str | None = None) -> None:
+    def __init__(self, folder: Path, run: Run, viewers: str | None = None) -> None:
         self.path = recording_path(folder, run)
         self._part = part_path(folder, run)
-        self.seen = time.monotonic()
-        self._stream = rr.RecordingStream("oxbow", recording_id=f"{run.mission_id}-{run.run_id}")
-        sinks: Sequence[rr.FileSink | rr.GrpcSink] = (
-            [rr.FileSink(str(self._part))] if live is None else [rr.FileSink(str(self._part)), rr.GrpcSink(live)]
-        )
-        self._stream.set_sinks(*sinks, default_blueprint=blueprint())
+        self._stream = rr.RecordingStream("oxbow", recording_id=recording_id(run))
+        with self._writing():
+            folder.mkdir(parents=True, exist_ok=True)
+            self._part.unlink(missing_ok=True)
+            sinks: list[rr.FileSink | rr.GrpcSink] = [rr.FileSink(str(self._part))]
+            if viewers is not None:
+                sinks.append(rr.GrpcSink(viewers))
+            self._stream.set_sinks(*sinks, default_blueprint=blueprint())
         self._stream.send_recording_name(run.mission_id)
 
     def add(self, stamped: Stamped) -> None:
         """Draw one layer."""
-        self.seen = time.monotonic()
         layer = stamped.layer
         frame = None if stamped.origin is None else Frame(*stamped.origin)
         self._stream.set_time("time", timestamp=stamped.time_s)
@@ -60,58 +66,60 @@ class Recording:
         for drawn in draw(layer, frame, stamped.part):
             self._stream.log(drawn.entity, drawn.archetype)
 
-    def close(self) -> Path:
+    def finish(self) -> Path:
         """Finish the file and put it in its place."""
-        self._stream.flush()
-        self._stream.disconnect()
-        return self._part.replace(self.path)
+        with self._writing():
+            self._stream.flush(timeout_sec=FLUSH_S)
+            self._stream.disconnect()
+            return self._part.replace(self.path)
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, RuntimeError) as error:  # rerun raises RuntimeError, for a full disk, too
+            _ABANDONED.append(self._stream)
+            with suppress(OSError):
+                self._part.unlink(missing_ok=True)
+            raise Unavailable(f"cannot be written: {error}", where=str(self.path)) from error
 
 
 class Recordings:
-    """All runs that are being recorded.
+    """All runs that this process records.
 
     Parameters
     ----------
     folder
         Where recordings are kept.
-    live
+    viewers
         Address of a server that viewers watch, if there is one.
-    clock
-        Tells the time by which idle runs are closed, in seconds.
     """
 
-    def __init__(self, folder: Path, live: str | None = None, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, folder: Path, viewers: str | None = None) -> None:
         self.folder = folder
-        self.live = live
-        self._clock = clock
-        self._open: dict[Run, Recording] = {}
-        self._finished = 0
-        folder.mkdir(parents=True, exist_ok=True)
-        sweep(folder)
+        self.viewers = viewers
+        self._open: dict[Run, Recording | None] = {}
+        """None stands for a recording that could not be begun: its layers have nowhere to go."""
 
-    def add(self, stamped: Stamped) -> None:
-        """Draw a layer in its run's recording, and close that with its last one."""
-        run = Run(mission_id=stamped.mission_id, run_id=stamped.request_id or "run")
+    def add(self, run: Run, stamped: Stamped) -> None:
+        """Draw a layer in its run's recording, which the first one begins."""
         if run not in self._open:
-            self._open[run] = Recording(self.folder, run, live=self.live)
-        self._open[run].add(stamped)
-        if stamped.layer.stage == "mission" and stamped.layer.name in END:
-            self._close(run)
-        self._close_idle()
+            self._open[run] = None
+            self._open[run] = Recording(self.folder, run, self.viewers)
+        recording = self._open[run]
+        if recording is not None:
+            recording.add(stamped)
 
-    def counts(self) -> Counts:
-        return Counts(finished=self._finished, open=len(self._open))
+    def finish(self, run: Run) -> None:
+        """Put the recording of a run in its place."""
+        recording = self._open.pop(run, None)
+        if recording is not None:
+            _log.info("wrote %s", recording.finish())
 
     def close(self) -> None:
-        """Finish every file."""
-        for run in list(self._open):
-            self._close(run)
-
-    def _close_idle(self) -> None:
-        for run, recording in list(self._open.items()):
-            if self._clock() - recording.seen > IDLE_S:
-                self._close(run)
-
-    def _close(self, run: Run) -> None:
-        self._finished += 1
-        _log.info("wrote %s", self._open.pop(run).close())
+        """Finish every file, whatever becomes of another."""
+        for run in tuple(self._open):
+            try:
+                self.finish(run)
+            except OxbowError as error:
+                _log.error("%s", error)

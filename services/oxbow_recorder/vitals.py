@@ -21,10 +21,11 @@ SERVICE = "recorder"
 
 @dataclass(frozen=True)
 class Counts:
-    """Runs whose recordings were finished, and runs that are being recorded."""
+    """Runs whose recordings were finished, runs that are being recorded, and the processes that write."""
 
     finished: int
     open: int
+    writers: tuple[int, ...]
 
 
 def answer_introspection(session: Session, instance: str, counts: Callable[[], Counts]) -> None:
@@ -57,7 +58,7 @@ def answer_introspection(session: Session, instance: str, counts: Callable[[], C
             p95_s=0.0,
             worker_restarts=0,
             session_rss_bytes=rss_bytes(os.getpid()),
-            worker_rss_bytes=0,
+            worker_rss_bytes=sum(map(rss_bytes, now.writers)),
         )
 
     answers: dict[str, Callable[[], msgspec.Struct]] = {"ping": ping, "info": info, "stats": stats}

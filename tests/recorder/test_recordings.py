@@ -8,14 +8,17 @@ import numpy as np
 import pytest
 import shapely
 
+from oxbow.errors import Unavailable
 from oxbow.mission import read_mission
 from oxbow.pipeline import plan_mission
 from oxbow.recording import Layer, LayerKind, Stamped
 from oxbow.route import RouteMethod
 from oxbow_cli.local import local_call
+from oxbow_recorder.address import Run
 from oxbow_recorder.blueprint import blueprint
 from oxbow_recorder.drawing import draw
-from oxbow_recorder.recordings import IDLE_S, Recordings
+from oxbow_recorder.files import holds
+from oxbow_recorder.recordings import Recordings
 
 LAKE = Path(__file__).parents[2] / "docs/examples/lake.json"
 ENTITIES = """
@@ -27,8 +30,17 @@ ENTITIES = """
 END = Layer(stage="mission", name="done", kind=LayerKind.LOG, text="done", scalars={"path_s": 1.0})
 
 
-def stamped(layer: Layer, mission: str = "meander", run: str = "r1") -> Stamped:
-    return Stamped(mission_id=mission, origin=(46.1, 1.9), request_id=run, time_s=1_700_000_000.0, layer=layer)
+def stamped(layer: Layer, run: Run) -> Stamped:
+    ids = {"mission_id": run.mission_id, "request_id": run.run_id}
+    return Stamped(**ids, origin=(46.1, 1.9), time_s=1_700_000_000.0, layer=layer)
+
+
+def record(recordings: Recordings, *layers: Layer, run: str = "r1") -> None:
+    """Record a run from its first layer to its last."""
+    whose = Run(mission_id="meander", run_id=run)
+    for layer in layers:
+        recordings.add(whose, stamped(layer, whose))
+    recordings.finish(whose)
 
 
 def rerun(*arguments: str | Path) -> str:
@@ -47,9 +59,7 @@ def layers() -> list[Layer]:
 
 
 def test_a_plan_is_recorded_and_read_back(layers, tmp_path):
-    recordings = Recordings(tmp_path)
-    for layer in layers:
-        recordings.add(stamped(layer))
+    record(Recordings(tmp_path), *layers)
     file = tmp_path / "meander.rrd"
     assert [path.name for path in tmp_path.iterdir()] == ["meander.rrd"]
     assert "without error" in rerun("verify", file)
@@ -139,8 +149,7 @@ def test_an_island_does_not_repeat_the_label_of_its_water():
 def test_another_run_replaces_the_recording_as_a_whole(tmp_path):
     recordings = Recordings(tmp_path)
     for run, name in (("r1", "old"), ("r2", "new")):
-        recordings.add(stamped(Layer(stage="path", name=name, geometries=(shapely.Point(1, 2),)), run=run))
-        recordings.add(stamped(END, run=run))
+        record(recordings, Layer(stage="path", name=name, geometries=(shapely.Point(1, 2),)), END, run=run)
     content = rerun("print", tmp_path / "meander.rrd")
     assert "/path/new" in content
     assert "/path/old" not in content
@@ -150,22 +159,30 @@ def test_missions_at_once_have_a_file_each_and_close_finishes_them(tmp_path):
     recordings = Recordings(tmp_path)
     layer = Layer(stage="path", name="path", geometries=(shapely.LineString([(0, 0), (5, 5)]),))
     for number in range(5):
-        recordings.add(stamped(layer, mission=f"m{number}"))
+        run = Run(mission_id=f"m{number}", run_id="r1")
+        recordings.add(run, stamped(layer, run))
     assert not list(tmp_path.glob("m*.rrd"))
     recordings.close()
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"m{number}.rrd" for number in range(5)]
     assert "without error" in rerun("verify", *sorted(tmp_path.iterdir()))
 
 
-def test_an_idle_run_is_closed(tmp_path):
-    now = [0.0]
-    recordings = Recordings(tmp_path, clock=lambda: now[0])
-    layer = Layer(stage="path", name="path", geometries=(shapely.Point(0, 0),))
-    recordings.add(stamped(layer, mission="idle"))
-    now[0] = 1e9 + IDLE_S
-    recordings.add(stamped(layer, mission="busy"))
-    assert (tmp_path / "idle.rrd").exists()
-    recordings.close()
+def test_a_recording_says_which_run_it_is_of(tmp_path):
+    record(Recordings(tmp_path), END, run="r12")
+    held = [
+        run
+        for run in ("r12", "r1", "r123", "r2")
+        if holds(tmp_path / "meander.rrd", Run(mission_id="meander", run_id=run))
+    ]
+    assert held == ["r12"]
+
+
+def test_a_folder_that_cannot_be_written_is_named_once_and_costs_its_recordings_alone(tmp_path):
+    (tmp_path / "file").touch()
+    recordings = Recordings(tmp_path / "file")
+    with pytest.raises(Unavailable, match=r"meander\.rrd: cannot be written"):
+        record(recordings, END)
+    record(recordings, END)  # later layers of that run have nowhere to go
 
 
 def test_points_rings_and_labels_are_all_drawn():
