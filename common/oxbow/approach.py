@@ -21,8 +21,8 @@ from shapely.ops import substring
 
 from oxbow.contracts import FloatArray, FreeSpace, Place, Vehicle
 from oxbow.errors import Infeasible
-from oxbow.route import RouteMethod, Router, Routes, make_router, way_to
-from oxbow.tolerances import ROUNDING_M
+from oxbow.route import Landing, RouteMethod, Router, Routes, make_router, way_to
+from oxbow.tolerances import HAIR_M, ON_SHORE_M, ROUNDING_M
 
 __all__ = ["Approach", "Harbour"]
 
@@ -50,9 +50,9 @@ class Approach:
         The share, as a space of its own.
     launch, recovery
         Where the path in the share begins and ends: the vehicle's own places, or the gate.
-    out, home : ndarray of shape (n, 2)
-        Middle lines of the legs, from the start to the gate and from the gate to the recovery; None where the
-        place is reached without crossing other shares.
+    out, home
+        Middle lines of the legs, from the start and from the recovery to the gate; None where the place is reached
+        without crossing other shares.
     apart_m
         How far legs may run beside their middle lines.
     water
@@ -62,8 +62,8 @@ class Approach:
     space: FreeSpace
     launch: Place
     recovery: Place
-    out: FloatArray | None = None
-    home: FloatArray | None = None
+    out: MiddleLine | None = None
+    home: MiddleLine | None = None
     apart_m: float = 0.0
     water: BaseGeometry = field(default_factory=Polygon)
 
@@ -94,8 +94,8 @@ class Approach:
     @property
     def _legs_m(self) -> float:
         """How long the legs may become."""
-        legs = [LineString(leg) for leg in (self.out, self.home) if leg is not None]
-        return sum(SPARE * leg.length + 6.0 * self.apart_m for leg in legs)
+        legs = [leg for leg in (self.out, self.home) if leg is not None]
+        return sum(SPARE * LineString(leg.points).length + 6.0 * self.apart_m for leg in legs)
 
     def joined(self, path: LineString) -> LineString:
         """A path in the share, with its legs: from the vehicle's start to its recovery.
@@ -116,18 +116,37 @@ class Approach:
     def _candidates(self, path: FloatArray) -> Iterator[_Candidate]:
         """Legs on either side, with the path either way round, ever nearer to each other."""
         if self.out is None or self.home is None:
-            yield _Candidate(self.out, path, self.home)
+            out = None if self.out is None else self.out.points
+            home = None if self.home is None else self.home.points[::-1]
+            yield _Candidate(out, path, home)
             return
         line = LineString(path)
         for apart_m in self.apart_m * 0.5 ** np.arange(HALVINGS):
             inner = shapely.get_coordinates(substring(line, 2.0 * apart_m, line.length - 2.0 * apart_m))
             for side, way in itertools.product((1.0, -1.0), (inner, inner[::-1])):
-                out = np.vstack([self.out[:1], _beside(self.out[1:-1], side * apart_m)])
-                home = np.vstack([_beside(self.home[1:-1], side * apart_m), self.home[-1:]])
-                yield _Candidate(out, way, home)
+                yield _Candidate(self.out.beside(side * apart_m), way, self.home.beside(-side * apart_m)[::-1])
 
     def _keeps_to_water(self, leg: LineString) -> bool:
         return bool(leg.difference(self.water.buffer(OFF_M)).length == 0.0)
+
+
+@dataclass(frozen=True)
+class MiddleLine:
+    """The middle line (n, 2) of a leg, from a place to a gate; from ashore its second point is the berth."""
+
+    points: FloatArray
+    is_ashore: bool
+
+    def beside(self, apart_m: float) -> FloatArray:
+        """The leg to the right of its middle line, without the gate: over land by a hair, then by a distance."""
+        first = 1 if self.is_ashore else 0
+        afloat = _beside(self.points[first:-1], apart_m)[1:]
+        if not self.is_ashore:
+            return np.vstack([self.points[:1], afloat])
+        place, berth = self.points[:2]
+        along = (berth - place) / np.hypot(*(berth - place))
+        hair = np.copysign(HAIR_M, apart_m) * np.array([along[1], -along[0]])
+        return np.vstack([place, berth + hair, afloat])
 
 
 @dataclass(frozen=True)
@@ -163,8 +182,8 @@ class Harbour:
 
     def __init__(self, space: FreeSpace, spacing_m: float) -> None:
         self.space = space
-        shore = Routes(space.water)
-        self._lanes = [_Lanes(space, shore, APART * spacing_m * 0.5**step) for step in range(HALVINGS)]
+        self._shore = Routes(space.water)
+        self._lanes = [_Lanes(space, self._shore, APART * spacing_m * 0.5**step) for step in range(HALVINGS)]
 
     def approach(self, share: Polygon, vehicle: Vehicle) -> Approach:
         """The approach of a vehicle to its share.
@@ -182,9 +201,7 @@ class Harbour:
         found = self._to_gate(share, start if out_is_remote else recovery)
         lanes, way = found.lanes, found.line
         gate: Place = (float(way[-1, 0]), float(way[-1, 1]))
-        home = way
-        if out_is_remote and recovery != start:
-            home = np.vstack([lanes.way(recovery, way[-2]), gate])
+        home = np.vstack([lanes.way(recovery, way[-2]), gate]) if out_is_remote and recovery != start else way
         # The gate becomes a vertex: no path in the share passes between it and the rim.
         share = shapely.snap(share, Point(gate), ROUNDING_M)
         water = share if out_is_remote and home_is_remote else self.space.water
@@ -193,15 +210,18 @@ class Harbour:
             launch=gate if out_is_remote else start,
             recovery=gate if home_is_remote else recovery,
             water=shapely.union_all([self.space.free, *map(lanes.beside_entry, remote)]),
-            out=way if out_is_remote else None,
-            home=home[::-1] if home_is_remote else None,
+            out=self._middle_line(way, start) if out_is_remote else None,
+            home=self._middle_line(home, recovery) if home_is_remote else None,
             apart_m=lanes.apart_m,
         )
 
+    def _middle_line(self, points: FloatArray, place: Place) -> MiddleLine:
+        return MiddleLine(points, Landing.of(place, self.space.water).is_ashore)
+
     def _is_remote(self, share: Polygon, place: Place) -> bool:
-        """Whether a place is nearer to other free water than to the share."""
-        point = Point(place)
-        return bool(share.distance(point) > self.space.free.distance(point) + ROUNDING_M)
+        """Whether the way from a place comes to other free water before the share."""
+        entry = Point(way_to(self.space.free, self._shore, place)[-1])
+        return not shapely.dwithin(share, entry, ROUNDING_M)
 
     def _to_gate(self, share: Polygon, place: Place) -> _Way:
         """The middle line of a leg from a place to a share, in lanes as wide as the water allows."""
@@ -250,9 +270,10 @@ class _Lanes:
         return np.vstack([entry[:-1], far, gate])
 
     def beside_entry(self, place: Place) -> BaseGeometry:
-        """Where legs may run from a place to the middle of the free space; over land where the place is ashore."""
+        """Where legs may run from a place to the middle of the free space; over land to the berth alone."""
+        landing = Landing.of(place, self.space.water)
         strip = LineString(self._entry(place)).buffer(self.apart_m)
-        return strip & self.space.water if self.space.water.intersects(Point(place).buffer(OFF_M)) else strip
+        return (strip & self.space.water) | LineString([landing.place, landing.berth]).buffer(ON_SHORE_M)
 
     def _entry(self, place: Place) -> FloatArray:
         """The way (n, 2) from a place, ashore or not, to the middle of the free space."""

@@ -51,6 +51,10 @@ class Member:
         """Whether the Mission File names its vehicles."""
         return "LaunchPoint" in self.fields
 
+    def field(self, name: str) -> str:
+        """What the Mission File calls a field that stages know by this name."""
+        return self.fields.get(name, name)
+
     def told(self, warning: str) -> str:
         """A warning, and which vehicle it is about."""
         return f"{self.vehicle.name}: {warning}" if self.is_named else warning

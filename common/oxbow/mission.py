@@ -22,6 +22,7 @@ from oxbow.frame import Position, lonlat
 from oxbow.plan import PlanOptions, PlanRecord
 from oxbow.prior import PriorFeature, PriorModel, parse_prior, prior_document
 from oxbow.strict_json import decode_json, document_of, gathered, gathered_part, utf8
+from oxbow.tolerances import DEFAULT_LEAST_WIDTH_M, DEFAULT_SHORE_TOLERANCE_M
 from oxbow.vehicles import GivenVehicle, VehiclePath, require_distinct
 
 __all__ = [
@@ -87,6 +88,8 @@ _JSON_NAMES = {
     "master_length_m": "Master_length",
     "slave_length_m": "Slave_length",
     "safety_m": "Safety",
+    "shore_tolerance_m": "Shore_tolerance",
+    "least_width_m": "Least_width",
     "minimal_spatial_rate_m": "Minimal_spatial_rate",
     "swath_m": "Swath",
     "vehicles": "Vehicles",
@@ -104,6 +107,8 @@ _POSITIVE = (
     "minimal_spatial_rate_m",
     "swath_m",
 )
+_BOUNDS = {"shore_tolerance_m": (0.0, 10_000.0), "least_width_m": (1e-3, 1_000.0)}
+"""Least and greatest value, m: a seam of rounding width is never water, and nobody carries a boat for hours."""
 _PARTS: dict[str, tuple[type[msgspec.Struct], bool]] = {
     "Bloom": (Bloom, False),
     "Vehicles": (GivenVehicle, True),
@@ -136,6 +141,10 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
         The name under which the outline came, and is written.
     safety_m
         Least distance from the outline and the zones.
+    shore_tolerance_m
+        How far from the water a vehicle may start or be recovered.
+    least_width_m
+        Water narrower than this is not water.
     minimal_spatial_rate_m
         Least distance between parallel segments of the path; absent: as close as the length allows.
     swath_m
@@ -164,6 +173,8 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
     master_length_m: float = 20_000.0
     slave_length_m: float = 15_000.0
     safety_m: float = 0.0
+    shore_tolerance_m: float = DEFAULT_SHORE_TOLERANCE_M
+    least_width_m: float = DEFAULT_LEAST_WIDTH_M
     minimal_spatial_rate_m: float | None = None
     swath_m: float | None = None
     vehicles: tuple[GivenVehicle, ...] | None = None
@@ -184,6 +195,12 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
             value = getattr(self, field)
             if value is not None and not (math.isfinite(value) and value >= 0):
                 raise InvalidMission(f"is {value!r}; expected a finite number >= 0", where=_JSON_NAMES[field])
+        for field, (least, most) in _BOUNDS.items():
+            value = getattr(self, field)
+            if not least <= value <= most:
+                raise InvalidMission(
+                    f"is {value!r}; expected a number from {least:g} to {most:g}", where=_JSON_NAMES[field]
+                )
         if self.bloom is None and self.mission_type in NEEDS_BLOOM:
             raise InvalidMission(
                 f"is missing; a mission of type {self.mission_type} needs its Sensor and Value", where="Bloom"

@@ -110,8 +110,13 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
         safety_m=mission.safety_m,
         spacing_m=site.nominal_spacing_m,
         tolerance_m=options.tolerance_m,
+        places=tuple(site.ends.values()),
+        shore_tolerance_m=mission.shore_tolerance_m,
+        least_width_m=mission.least_width_m,
     )
-    task = Task(mission, options, site, call(CONTOUR, contour), call)
+    with renamed({f"places[{index}]": field for index, field in enumerate(site.ends)}):
+        space = call(CONTOUR, contour)
+    task = Task(mission, options, site, space, call)
     teams = [
         treatment(task) if role is Role.SLAVE and site.hot_spots else survey(task, site.team(role))
         for role in mission.mission_type.roles

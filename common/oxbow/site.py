@@ -22,9 +22,6 @@ from oxbow.weights import weighted_areas
 
 __all__ = ["Site"]
 
-ON_SHORE_M = 1.0
-"""A vehicle's start no farther than this from the water is on its shore."""
-
 
 @dataclass(frozen=True)
 class Site:
@@ -79,6 +76,11 @@ class Site:
         """The vehicles of one role."""
         return tuple(member for member in self.members if member.vehicle.role is role)
 
+    @property
+    def ends(self) -> dict[str, Place]:
+        """Where vehicles start and are recovered, by the fields that say so; the starts come first."""
+        return _ends(self.members)
+
     @classmethod
     def of(cls, mission: Mission) -> Site:
         """Check a mission's geometry and bring it to planar metres.
@@ -87,9 +89,9 @@ class Site:
         ------
         InvalidMission
             A contour has no area, the outline meets itself or reaches farther than 300 km from its mean
-            point, a point lies farther than that from the water, a vehicle's own start or recovery lies outside
-            the water, or what is to be treated is missing, on land or overlaps; the error names field, index and
-            value.
+            point, a point lies farther than that from the water, a vehicle starts or is recovered farther ashore
+            than the mission's tolerance, or what is to be treated is missing, on land or overlaps; the error names
+            field, index and value.
         Infeasible
             The forbidden zones cover all of the water.
         """
@@ -108,12 +110,11 @@ class Site:
         dangers = danger_zones(mission, frame, outline)
 
         def locate(name: str, position: Position) -> Place:
-            place = _place(name, position, frame, outline)
-            if name.startswith("Vehicles"):
-                _require_afloat(name, place, water)
-            return place
+            return _place(name, position, frame, outline)
 
         fleet = members(mission, locate)
+        for name, place in _ends(fleet).items():
+            _require_near(name, place, water, mission.shore_tolerance_m)
         return cls(
             frame=frame,
             outline=outline,
@@ -197,11 +198,18 @@ def _idle_warnings(mission: Mission) -> tuple[str, ...]:
     return (f"Vehicles: {', '.join(idle)} take no part in a mission of type {mission.mission_type}",)
 
 
-def _require_afloat(name: str, place: Place, water: BaseGeometry) -> None:
+def _ends(fleet: Sequence[Member]) -> dict[str, Place]:
+    starts = {member.field("LaunchPoint"): member.vehicle.start for member in fleet}
+    return starts | {member.field("RecoveryPoint"): member.vehicle.recovery for member in fleet}
+
+
+def _require_near(name: str, place: Place, water: BaseGeometry, tolerance_m: float) -> None:
     distance_m = float(shapely.distance(water, Point(place)))
-    if distance_m > ON_SHORE_M:
+    if distance_m > tolerance_m:
         raise InvalidMission(
-            f"lies {distance_m:.0f} m outside the water; expected a place in it or on its shore", where=name
+            f"lies {distance_m:.3g} m from the water, on land or in a forbidden zone; expected a place in the"
+            f" water or at most Shore_tolerance = {tolerance_m:g} m from it, or a greater Shore_tolerance",
+            where=name,
         )
 
 

@@ -2,32 +2,55 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import shapely
-from shapely import Polygon
+from shapely import MultiPolygon, Polygon
 
 from oxbow.contracts import ContourRequest, DroppedPart, FreeSpace
+from oxbow.errors import Infeasible
+from oxbow.narrows import least_basin_m2, without_narrows
 from oxbow.recording import Layer, LayerKind, Show
+from oxbow_contour.basins import require_reachable
 from oxbow_contour.free_space import Eroded, erode_water
+from oxbow_contour.home import home_water
 from oxbow_contour.water import true_water
 
 __all__ = ["handle"]
 
+LEAST_LOST_M2 = 0.01
+"""Less narrow water than this is not worth a figure."""
+
+OTHER_PART = "not connected to the largest part at this safety distance"
+OTHER_WATER = "in water that is not connected to that of the launch point"
+
 
 def handle(request: ContourRequest, show: Show) -> FreeSpace:
-    """Simplify the contours, erode the water by the safety distance, keep the largest part.
+    """Choose the water that is planned on, simplify its contours, erode it by the safety distance.
 
     Raises
     ------
+    InvalidMission
+        A place lies too far from any water that is wide enough.
     Infeasible
-        No water is left; the message names the largest safety distance that would leave some.
+        No water is left, and the message names the largest safety distance that would leave some; or the places
+        lie in waters, or by basins, that are not connected.
     """
     show(Layer(stage="contour", name="raw", geometries=(request.outline, *request.zones)))
-    water = true_water(request.outline, request.zones)
-    eroded = erode_water(water, request.safety_m, request.spacing_m, request.tolerance_m)
+    water = MultiPolygon(true_water(request.outline, request.zones))
+    opened = without_narrows(water, request.least_width_m)
+    waters = tuple(opened.geoms)
+    if not waters:
+        raise Infeasible(
+            f"{request.least_width_m:g} m leaves no water; expected less than the water is wide",
+            where="least_width_m",
+        )
+    home = home_water(waters, request)
+    eroded = erode_water([home], request.safety_m, request.spacing_m, request.tolerance_m)
+    require_reachable(eroded.parts, home, request)
     free, *others = eroded.parts
-    home = next(part for part in water if part.contains(free.representative_point()))
     shapely.prepare(home)
-    dropped = tuple(_dropped(part, home) for part in others)
+    dropped = (*_other_waters(waters, home, request), *(_dropped(part, OTHER_PART) for part in others))
     _show_result(eroded, dropped, show)
     return FreeSpace(
         free=free,
@@ -35,25 +58,39 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
         tolerance_m=eroded.simplified.tolerance_m,
         compression=eroded.simplified.compression,
         dropped=dropped,
-        warnings=(*eroded.warnings, *_summary(dropped)),
+        warnings=(*eroded.warnings, *_narrow(water, opened, request), *_summary(dropped)),
     )
 
 
-def _dropped(part: Polygon, home: Polygon) -> DroppedPart:
+def _other_waters(waters: Sequence[Polygon], home: Polygon, request: ContourRequest) -> Iterator[DroppedPart]:
+    """The waters that are not planned on, but for what is too small to matter."""
+    least_m2 = least_basin_m2(request.safety_m, request.least_width_m)
+    for part in waters:
+        if part.area >= least_m2 and part is not home:
+            yield _dropped(part, OTHER_WATER)
+
+
+def _dropped(part: Polygon, reason: str) -> DroppedPart:
     place = part.representative_point()
-    reason = (
-        "not connected to the largest part at this safety distance"
-        if home.contains(place)
-        else "in water that is not connected to the largest part's"
-    )
     return DroppedPart(area_m2=part.area, reason=reason, place=(place.x, place.y), outline=part)
+
+
+def _narrow(water: MultiPolygon, opened: MultiPolygon, request: ContourRequest) -> tuple[str, ...]:
+    if opened.equals_exact(without_narrows(water, 0.0), tolerance=0.0):
+        return ()
+    lost_m2 = max(water.area - opened.area, 0.0)
+    lost = f"{lost_m2:.2g} m2 together" if lost_m2 >= LEAST_LOST_M2 else "seams without an area"
+    return (f"water narrower than Least_width = {request.least_width_m:g} m is left out: {lost}",)
 
 
 def _summary(dropped: tuple[DroppedPart, ...]) -> tuple[str, ...]:
     if not dropped:
         return ()
     area_m2 = sum(part.area_m2 for part in dropped)
-    return (f"dropped, for want of a connection to the largest part: {len(dropped)} of {area_m2:.0f} m2 together",)
+    return (
+        f"dropped, for want of a connection to the water that is planned on: {len(dropped)} of {area_m2:.0f} m2"
+        " together",
+    )
 
 
 def _show_result(eroded: Eroded, dropped: tuple[DroppedPart, ...], show: Show) -> None:

@@ -10,11 +10,10 @@ from typing import Protocol
 
 import numpy as np
 import shapely
-from shapely import LineString, Point
+from shapely import LineString
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray, FreeSpace, PathRequest, SpacingStep, WeightedArea
-from oxbow.errors import Infeasible
 from oxbow.recording import Layer, LayerKind, Show
 from oxbow.route.gate_routes import Routes
 from oxbow.sweep import from_sweep, to_sweep
@@ -75,9 +74,8 @@ class Task:
         Raises
         ------
         Infeasible
-            The launch or the recovery point lies in water that is not connected to the free space.
+            No water leads from the launch or the recovery point to the free space.
         """
-        _require_connected(request)
         least_spacing_m = max(request.min_spacing_m, finest_spacing_m(request.space))
         nominal_m = max(request.space.free.area / request.length_m, least_spacing_m)
         waters = prepared_waters(request, nominal_m)
@@ -173,18 +171,6 @@ def finest_spacing_m(space: FreeSpace) -> float:
     Rendas and Li 2016, section 1.2.1.2, find that the spacing needs a least value for small sites.
     """
     return math.sqrt(space.free.area) / FINEST
-
-
-def _require_connected(request: PathRequest) -> None:
-    """A point in water that is not connected to the free space cannot be reached at the safety distance."""
-    for where, place in (("LaunchPoint", request.launch), ("RecoveryPoint", request.recovery)):
-        for part in request.space.dropped:
-            if part.outline.covers(Point(place)):
-                raise Infeasible(
-                    f"lies in {part.area_m2:.0f} m2 of water that is left out ({part.reason}); move it into the"
-                    " largest part, or choose a smaller Safety",
-                    where,
-                )
 
 
 def prepared_waters(request: PathRequest, spacing_m: float) -> Waters:

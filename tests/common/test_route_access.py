@@ -1,11 +1,15 @@
-"""Ways to an area from outside it: straight where that is safe or nothing is known, else through the water."""
+"""Ways to an area from outside it: over land to the nearest water, and through the water from there."""
 
 import numpy as np
 import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from shapely import LineString, MultiPolygon, Point, box
 
 from oxbow.errors import Infeasible
 from oxbow.route import Routes, way_to
+from oxbow.tolerances import ON_SHORE_M
 
 LAKE = box(0, 0, 100, 100)
 CREEK = box(100, 40, 160, 44).union(box(156, 40, 160, 90))
@@ -21,8 +25,34 @@ def test_straight_where_that_keeps_to_the_water():
     assert way_to(AREA, Routes(WATER), (96, 50)).tolist() == [[96, 50], [90, 50]]
 
 
-def test_straight_from_ashore():
-    assert way_to(AREA, Routes(WATER), (150, 95)).tolist() == [[150, 95], [90, 90]]
+@pytest.mark.parametrize("place", [(-30.0, 50.0), (-0.5, 50.0)])
+def test_over_land_to_the_nearest_water_and_on_as_from_there(place):
+    assert way_to(AREA, Routes(WATER), place).tolist() == [list(place), [0, 50], [10, 50]]
+
+
+def test_from_the_bank_of_a_creek_as_from_the_creek():
+    ashore, afloat = (way_to(AREA, Routes(WATER), place) for place in ((161.0, 88.0), (160.0, 88.0)))
+    assert ashore[:2].tolist() == [[161, 88], [160, 88]]
+    assert ashore[1:].tolist() == afloat.tolist()
+    assert len(afloat) > 2
+
+
+@pytest.mark.parametrize("off_m", [0.004, 0.0, -0.01])
+def test_by_a_hair_ashore_is_on_the_shore(off_m):
+    way = way_to(AREA, Routes(WATER), (160.0 + off_m, 88.0))
+    assert way[0].tolist() == [160.0 + off_m, 88.0]
+    on_shore = way_to(AREA, Routes(WATER), (160.0, 88.0))
+    assert np.allclose(way[1:], on_shore[1:])
+
+
+@given(place=st.tuples(st.floats(-30, 190), st.floats(-30, 120)))
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_land_is_crossed_once_straight_from_the_place_to_the_water(place):
+    line = LineString(way_to(AREA, Routes(WATER), place))
+    distance_m = WATER.distance(Point(place))
+    over_land = line.difference(WATER.buffer(1e-9))
+    assert over_land.length == pytest.approx(distance_m if distance_m > ON_SHORE_M else 0.0, abs=ON_SHORE_M)
+    assert over_land.length == 0.0 or shapely.dwithin(over_land, Point(place), 1e-9)
 
 
 @pytest.mark.parametrize("area", [AREA, MultiPolygon([box(10, 10, 20, 20), box(60, 30, 90, 60)])])

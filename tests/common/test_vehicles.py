@@ -89,9 +89,9 @@ def test_what_a_vehicle_leaves_out_is_the_missions():
         ([boat(Start={"lat": 46.0})], "Vehicles[0].Start", "long"),
         ([boat(role="master")], "Vehicles", "no slave"),
         ([], "Vehicles", "no slave"),
-        ([boat(Start=at(46.03, 1.03))], "Vehicles[0].Start", "outside the water"),
-        ([boat(), boat("b", Recovery=at(45.99, 1.0))], "Vehicles[1].Recovery", "outside the water"),
-        ([boat(Start=at(46.006, 1.006))], "Vehicles[0].Start", "outside the water"),
+        ([boat(Start=at(46.03, 1.03))], "Vehicles[0].Start", "from the water, on land"),
+        ([boat(), boat("b", Recovery=at(45.99, 1.0))], "Vehicles[1].Recovery", "from the water, on land"),
+        ([boat(Start=at(46.006, 1.006))], "Vehicles[0].Start", "from the water, on land"),
     ],
 )
 def test_errors_name_the_vehicle_the_field_and_the_value(vehicles, where, says):

@@ -7,6 +7,7 @@ import shapely
 from shapely import Polygon
 
 from oxbow.contracts import ContourRequest, DecomposeRequest, Method, PathRequest, Place
+from oxbow.errors import renamed
 from oxbow.recording import discard
 from oxbow_contour.service import handle as contour
 from oxbow_decomposition.service import handle as decompose
@@ -48,9 +49,16 @@ def request(
     spacing_m = water.area / length_m
     launch = launch or water.exterior.coords[0]
     outline, zones = Polygon(water.exterior), tuple(Polygon(ring) for ring in water.interiors)
-    space = contour(
-        ContourRequest(outline=outline, zones=zones, safety_m=safety * scale_m, spacing_m=spacing_m), discard
+    asked = ContourRequest(
+        outline=outline,
+        zones=zones,
+        safety_m=safety * scale_m,
+        spacing_m=spacing_m,
+        places=(launch, recovery or launch),
+        shore_tolerance_m=scale_m,
     )
+    with renamed({"places[0]": "LaunchPoint", "places[1]": "RecoveryPoint"}):
+        space = contour(asked, discard)
     cells = decompose(DecomposeRequest(free=space.free, spacing_m=spacing_m, heading_rad=heading_rad), discard)
     return PathRequest(
         method=method,

@@ -4,8 +4,16 @@ from __future__ import annotations
 
 from shapely import Polygon
 
-from oxbow.contracts.message import MOST_LENGTH_M, Message, Place, require_area, require_finite, require_place
-from oxbow.tolerances import FARTHEST_M
+from oxbow.contracts.message import (
+    MOST_LENGTH_M,
+    Message,
+    Place,
+    require_area,
+    require_finite,
+    require_place,
+    require_places,
+)
+from oxbow.tolerances import DEFAULT_SHORE_TOLERANCE_M, FARTHEST_M
 
 __all__ = ["ContourRequest", "DroppedPart", "FreeSpace"]
 
@@ -30,6 +38,10 @@ class ContourRequest(Message, frozen=True, kw_only=True):
     `spacing_m` is the nominal spacing of transects, area / length: the scale of detail that matters.
     `tolerance_m` is the half width of the strip a simplified edge may stand for; by default it is
     derived from `safety_m` and `spacing_m`.
+
+    `places` are the starts and recoveries of all vehicles. The first decides which water is planned on; without
+    any it is the largest. Each lies at most `shore_tolerance_m` from water that can be planned on. Water narrower
+    than `least_width_m` is none; by default all water counts.
     """
 
     outline: Polygon
@@ -37,18 +49,24 @@ class ContourRequest(Message, frozen=True, kw_only=True):
     safety_m: float = 0.0
     spacing_m: float
     tolerance_m: float | None = None
+    places: tuple[Place, ...] = ()
+    shore_tolerance_m: float = DEFAULT_SHORE_TOLERANCE_M
+    least_width_m: float = 0.0
 
     def __post_init__(self) -> None:
         require_area(self, "outline", "zones")
-        require_finite(self, "safety_m", "tolerance_m", least=0.0, most=FARTHEST_M)
+        lengths = "safety_m", "tolerance_m", "shore_tolerance_m", "least_width_m"
+        require_finite(self, *lengths, least=0.0, most=FARTHEST_M)
         require_finite(self, "spacing_m", above=0.0, most=MOST_LENGTH_M)
+        require_places(self, "places")
 
 
 class FreeSpace(Message, frozen=True, kw_only=True):
     """Where a vehicle may go.
 
     `free` is one polygon (islands are holes), valid, and inside the true outline eroded by the safety
-    distance. `water` is the true water, not eroded, that launch and recovery legs may cross.
+    distance. `water` is the connected true water about it, not eroded and without narrows, that launch and
+    recovery legs may cross.
     """
 
     free: Polygon

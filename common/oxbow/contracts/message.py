@@ -26,6 +26,7 @@ __all__ = [
     "require_finite",
     "require_line",
     "require_place",
+    "require_places",
 ]
 
 MOST_SEED = 2**53
@@ -81,11 +82,22 @@ def require_line(message: Message, *fields: str) -> None:
 def require_place(message: Message, *fields: str) -> None:
     """Check fields that hold a place or none: within the plane."""
     for field in fields:
-        place = getattr(message, field)
-        if place is not None and not all(abs(coordinate) <= FARTHEST_M for coordinate in place):
-            raise InvalidMission(
-                f"is {tuple(place)!r}; expected two finite numbers within {FARTHEST_M:g} m", where=field
-            )
+        if (place := getattr(message, field)) is not None:
+            _require_in_plane(place, field)
+
+
+def require_places(message: Message, *fields: str) -> None:
+    """Check fields that hold places: each within the plane."""
+    for field in fields:
+        for index, place in enumerate(getattr(message, field)):
+            _require_in_plane(place, f"{field}[{index}]")
+
+
+def _require_in_plane(place: Place, where: str) -> None:
+    if not all(abs(coordinate) <= FARTHEST_M for coordinate in place):
+        raise InvalidMission(
+            f"is {tuple(place)!r}; expected two finite numbers within {FARTHEST_M:g} m", where=where
+        )
 
 
 def _geometries(message: Message, fields: Iterable[str]) -> Iterator[tuple[str, BaseGeometry]]:

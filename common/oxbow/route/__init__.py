@@ -1,6 +1,6 @@
 """Routes through the water: several methods behind one `Router`."""
 
-from oxbow.route.access import way_to
+from oxbow.route.access import Landing, way_to
 from oxbow.route.danger import NO_DANGER, Danger
 from oxbow.route.dynamic import DynamicRouter
 from oxbow.route.gate_routes import Routes
@@ -11,6 +11,7 @@ __all__ = [
     "NO_DANGER",
     "Danger",
     "DynamicRouter",
+    "Landing",
     "Route",
     "RouteMethod",
     "Router",

@@ -1,6 +1,8 @@
-"""How an area of the water is reached from a place outside it, as from a harbour or up a creek."""
+"""How an area of the water is reached from a place outside it: from ashore, from a harbour or up a creek."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -10,16 +12,64 @@ from shapely.geometry.base import BaseGeometry
 from oxbow.contracts import FloatArray, Place
 from oxbow.errors import Infeasible
 from oxbow.route.gate_routes import Routes
-from oxbow.tolerances import ROUNDING_M
+from oxbow.tolerances import ON_SHORE_M, ROUNDING_M
 
-__all__ = ["way_to"]
+__all__ = ["Landing", "way_to"]
+
+
+@dataclass(frozen=True)
+class Landing:
+    """Where a vehicle takes to the water.
+
+    Parameters
+    ----------
+    place
+        Where it stands: in the water, on its shore or ashore.
+    berth
+        The nearest place of the water: the same, where it stands in the water.
+    """
+
+    place: Place
+    berth: Place
+
+    @classmethod
+    def of(cls, place: Place, water: BaseGeometry) -> Landing:
+        """Where a vehicle at a place takes to the water."""
+        point = Point(place)
+        if shapely.dwithin(water, point, 0.0):
+            return cls(place, place)
+        x, y = shapely.get_coordinates(shapely.shortest_line(water, point))[0].tolist()
+        return cls(place, (x, y))
+
+    @property
+    def is_ashore(self) -> bool:
+        """Whether there is land to cross."""
+        return self.land_m > 0.0
+
+    @property
+    def land_m(self) -> float:
+        """Metres over land, straight to the berth; none for a place on the shore."""
+        return 0.0 if self._distance_m <= ON_SHORE_M else self._distance_m
+
+    @property
+    def off_shore_m(self) -> float:
+        """How far a place on the shore is from the water: by a hair, or by rounding."""
+        return self._distance_m - self.land_m
+
+    @property
+    def _distance_m(self) -> float:
+        return float(np.hypot(*np.subtract(self.place, self.berth)))
+
+    def onward(self, way: FloatArray) -> FloatArray:
+        """A way (n, 2) that begins at the berth, from the place on."""
+        return np.vstack([self.place, way if self.is_ashore else way[1:]])
 
 
 def way_to(area: BaseGeometry, routes: Routes, place: Place) -> FloatArray:
     """The way from a place to where it first meets an area, shape (n, 2).
 
-    Straight to the nearest place of the area, where that keeps to the water; or where the place is ashore, for
-    nobody knows then what lies between. Else along the middle of the water.
+    From ashore straight to the nearest place of the water, and on as from there. In the water straight to the
+    nearest place of the area, where that keeps to the water; else along its middle.
 
     Parameters
     ----------
@@ -35,12 +85,16 @@ def way_to(area: BaseGeometry, routes: Routes, place: Place) -> FloatArray:
     Infeasible
         No water leads from the place to the area.
     """
-    point = Point(place)
+    landing = Landing.of(place, routes.water)
+    return landing.onward(_way_afloat(area, routes, landing.berth))
+
+
+def _way_afloat(area: BaseGeometry, routes: Routes, berth: Place) -> FloatArray:
+    point = Point(berth)
     straight = shapely.shortest_line(point, area)
-    is_ashore = not shapely.dwithin(routes.water, point, ROUNDING_M)
-    if is_ashore or straight.difference(routes.water).length <= ROUNDING_M:
+    if straight.difference(routes.water).length <= ROUNDING_M:
         return np.asarray(shapely.get_coordinates(straight))
-    route = routes.to_area(np.array(place), area, routes.goals_in(area))
+    route = routes.to_area(np.array(berth), area, routes.goals_in(area))
     if route is None:
         raise Infeasible("lies in water from which no way leads to the free space", "LaunchPoint")
     outside = shapely.get_parts(route.difference(area))

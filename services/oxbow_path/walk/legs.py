@@ -23,9 +23,9 @@ from shapely.ops import substring
 
 from oxbow.contracts import FloatArray, Place
 from oxbow.errors import Infeasible, Internal, renamed
-from oxbow.route import way_to
+from oxbow.route import Landing, way_to
 from oxbow.route.gate_routes import Routes, taut
-from oxbow.tolerances import ROUNDING_M
+from oxbow.tolerances import HAIR_M, ON_SHORE_M, ROUNDING_M
 from oxbow_path.walk.region import largest
 
 __all__ = ["Access", "Passable", "access", "is_plainly_simple", "joined"]
@@ -47,13 +47,14 @@ HALVINGS = 12
 class Access:
     """How a launch or recovery point is reached: `leg` runs from it to the free space, through the water.
 
-    A point inside the free space has a leg of no length; that of a point ashore runs straight over land first.
-    `beside` is where the way back may run: a tenth of the leg's length to either side, in the water.
+    A point inside the free space has a leg of no length. That of a point ashore runs `land_m` straight over land
+    first, to its second vertex. `beside` is where the way back may run: a tenth of the leg's length to either
+    side, in the water.
     """
 
     leg: FloatArray
-    ashore: bool = False
-    beside: Polygon = field(default_factory=Polygon)
+    land_m: float = 0.0
+    beside: BaseGeometry = field(default_factory=Polygon)
 
     @property
     def place(self) -> Place:
@@ -69,6 +70,16 @@ class Access:
     def line(self) -> LineString:
         """The leg as a line."""
         return LineString(self.leg)
+
+    @property
+    def ashore(self) -> bool:
+        """Whether the leg begins over land."""
+        return self.land_m > 0.0
+
+    @property
+    def winds(self) -> bool:
+        """Whether the free space cannot be seen from where the leg takes to the water."""
+        return len(self.leg) - self.ashore > 2
 
 
 @dataclass(frozen=True)
@@ -95,36 +106,42 @@ class Passable:
 def access(place: Place, free: Polygon, water: Routes, *, where: str) -> Access:
     """The leg from a launch or recovery point to the free space.
 
-    The shortest line, where the water allows it or the point lies ashore. Else along the middle of the water,
-    pulled tight wherever that keeps half the safety distance from the shore.
+    From ashore, straight to the nearest place of the water. From there the shortest line, where the water allows
+    it; else along the middle of the water, pulled tight wherever that keeps half the safety distance from the
+    shore.
 
     Raises
     ------
     Infeasible
         The point's water is not connected to the free space.
     """
-    point = Point(place)
-    if free.covers(point):
+    if free.covers(Point(place)):
         return Access(np.array([place, place]))
+    landing = Landing.of(place, water.water)
     with renamed({"LaunchPoint": where}):
-        way = LineString(way_to(free, water, place))
-    if not water.water.covers(point):
-        return Access(shapely.get_coordinates(way), ashore=True, beside=_beside_line(way))
-    if len(way.coords) == 2:
-        return _in_water(way, water.water)
-    clearance_m = shapely.distance(Point(way.coords[-1]), water.water.boundary) / 2
-    around = water.water.intersection(box(*way.bounds).buffer(5 * clearance_m))
-    roomy = around.buffer(-clearance_m).union(point.buffer(4 * clearance_m).intersection(around))
-    return _in_water(shapely.get_parts(taut(way, roomy).difference(free))[0], water.water)
+        way = way_to(free, water, landing.berth)
+    if len(way) > 2:
+        way = _pulled_tight(way, free, water.water)
+    leg = landing.onward(way)
+    return Access(leg, landing.land_m, _beside_leg(leg, landing, water.water))
 
 
-def _in_water(leg: LineString, water: BaseGeometry) -> Access:
-    near = _beside_line(leg).intersection(water)
-    return Access(shapely.get_coordinates(leg), beside=near.buffer(ROUNDING_M))
+def _pulled_tight(way: FloatArray, free: Polygon, water: BaseGeometry) -> FloatArray:
+    clearance_m = shapely.distance(Point(way[-1]), water.boundary) / 2
+    line = LineString(way)
+    around = water.intersection(box(*line.bounds).buffer(5 * clearance_m))
+    roomy = around.buffer(-clearance_m).union(Point(way[0]).buffer(4 * clearance_m).intersection(around))
+    return np.asarray(shapely.get_coordinates(shapely.get_parts(taut(line, roomy).difference(free))[0]))
 
 
-def _beside_line(leg: LineString) -> Polygon:
-    return leg.buffer(OPENING * leg.length + ROUNDING_M)
+def _beside_leg(leg: FloatArray, landing: Landing, water: BaseGeometry) -> BaseGeometry:
+    """Where a leg may run: near itself in the water, and over land on its straight way."""
+    line = LineString(leg)
+    near = line.buffer(OPENING * line.length + ROUNDING_M)
+    afloat = water.intersection(box(*near.bounds)).buffer(landing.off_shore_m + ROUNDING_M).intersection(near)
+    if not landing.is_ashore:
+        return afloat
+    return afloat.union(LineString([landing.place, landing.berth]).buffer(ON_SHORE_M))
 
 
 def joined(
@@ -170,7 +187,7 @@ def joined(
         # Another detail makes another triangulation, whose way may keep clear of what this one touched.
         opening_m, detail_m = opening_m / 2, detail_m * OTHER_DETAIL
     for leg, where in ((launch, "LaunchPoint"), (recovery, "RecoveryPoint")):
-        if len(leg.leg) > 2:
+        if leg.winds:
             raise Infeasible("is reached only by water too narrow to come back beside the way out", where)
     raise Internal(f"the legs from {launch.place} and to {recovery.place} do not fit the ring", "legs")
 
@@ -217,20 +234,23 @@ def _closed(ring: LinearRing, launch: Access, free: BaseGeometry, opening_m: flo
     at = _meeting(line, launch.entry, free)
     round_trip = _part(line, at + opening_m / 2, at - opening_m / 2)
     for side in (1.0, -1.0):
-        back = _beside(launch.leg, opening_m, side)[::-1]
+        back = _beside(launch, opening_m, side)[::-1]
         yield _chain(launch.leg[:-1], round_trip, back)
         yield _chain(launch.leg[:-1], round_trip[::-1], back)
 
 
-def _beside(leg: FloatArray, offset_m: float, side: float) -> FloatArray:
-    """The leg's inner vertices, moved aside by a share of the offset that grows from 0 at its start."""
+def _beside(access: Access, offset_m: float, side: float) -> FloatArray:
+    """The way back along a leg, but for its entry: moved aside, over land by a hair, from there on ever more."""
+    leg = access.leg
     steps = np.hypot(*np.diff(leg, axis=0).T)
     if len(leg) <= 2 or steps.sum() == 0:
         return leg[:1]
-    share = np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
-    tangent = np.gradient(leg, axis=0)
+    along_m = np.cumsum(steps)[:-1]
+    afloat_m = np.maximum(along_m - access.land_m, 0.0) / max(steps.sum() - access.land_m, ROUNDING_M)
+    aside_m = (HAIR_M if access.ashore else 0.0) + offset_m * afloat_m
+    tangent = leg[2:] - leg[:-2]
     normal = np.column_stack([-tangent[:, 1], tangent[:, 0]]) / np.hypot(*tangent.T)[:, None]
-    return np.asarray((leg + side * offset_m * share[:, None] * normal)[:-1])
+    return np.vstack([leg[:1], leg[1:-1] + side * aside_m[:, None] * normal])
 
 
 def _open(

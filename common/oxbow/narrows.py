@@ -1,0 +1,72 @@
+"""Water too narrow to count, and free water too small to be a basin: what planner and certificate agree on."""
+
+from __future__ import annotations
+
+import math
+
+import shapely
+from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+__all__ = ["least_basin_m2", "without_narrows"]
+
+MITRE = 5.0
+"""Corners of the shore stay as they are down to an angle of 23 degrees; the tips of sharper ones are narrows."""
+
+SURPLUS = 1e-2
+"""What is dilated again is dilated by so much more, as a share: the shore is kept, not redrawn beside itself."""
+
+
+def without_narrows(water: Polygon | MultiPolygon, width_m: float) -> MultiPolygon:
+    """The water that a disc of this width can be moved about in: its opening, with the shore as it was.
+
+    Seams between a zone and a shore, spikes and rounding gaps are left out, and what only they connect comes
+    apart. Elsewhere every vertex of the shore stays where it is, at sharp corners too.
+
+    Parameters
+    ----------
+    water
+        Valid, in metres.
+    width_m
+        Narrower water is left out; at 0, none is.
+
+    Returns
+    -------
+    MultiPolygon
+        Its parts, the largest first; the water itself where it has no narrows, and empty where it is all narrow.
+    """
+    whole = _sorted(water)
+    if width_m == 0.0:
+        return whole
+    core = water.buffer(-width_m / 2)
+    if core.is_empty:
+        return MultiPolygon()
+    reach_m = MITRE * width_m / 2
+    shapely.prepare(core)
+    is_reached = shapely.dwithin(core, shapely.points(shapely.get_coordinates(water)), reach_m).all()
+    if is_reached and _rings(core) == _rings(water):
+        return whole
+    grown = core.buffer(width_m / 2 * (1.0 + SURPLUS), join_style="mitre", mitre_limit=MITRE)
+    return _sorted(water.intersection(grown))
+
+
+def least_basin_m2(safety_m: float, width_m: float) -> float:
+    """The area from which on a connected part of the free space is a basin, not a wide spot of a narrow water.
+
+    That of a disc as wide as the narrowest water that may be passed freely. A leg through narrow water may pass
+    wide spots; it may not pass a basin, whose own free water lies nearer.
+    """
+    return math.pi * max(safety_m, width_m / 2) ** 2
+
+
+def _rings(water: Polygon | MultiPolygon) -> tuple[int, int]:
+    """How many parts and islands there are: both change where narrows connect."""
+    parts = shapely.get_parts(water)
+    return len(parts), int(shapely.get_num_interior_rings(parts).sum())
+
+
+def _sorted(geometry: BaseGeometry) -> MultiPolygon:
+    """The polygons of a geometry that have an area, the largest first."""
+    parts: list[Polygon] = [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon)]
+    largest_first = sorted(parts, key=lambda part: (-part.area, part.bounds))
+    return MultiPolygon([part for part in largest_first if part.area > 0.0])

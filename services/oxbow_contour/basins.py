@@ -1,0 +1,69 @@
+"""Basins: parts of one water that only passages narrower than twice the safety distance connect."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Point, Polygon
+
+from oxbow.contracts import ContourRequest, Place
+from oxbow.errors import Infeasible
+from oxbow.narrows import least_basin_m2
+from oxbow.route import Routes
+from oxbow.tolerances import ROUNDING_M
+
+__all__ = ["require_reachable"]
+
+
+def require_reachable(parts: Sequence[Polygon], water: Polygon, request: ContourRequest) -> None:
+    """Check that a way from each of the request's places comes to the planned free space before any other.
+
+    Only the first and the last stretch of a path may be nearer to the shore than the safety distance: from a place
+    to the first free water there is. From a basin that the safety distance cuts off, no way leads on. Free water
+    smaller than `least_basin_m2` is no basin, but a wide spot on the way.
+
+    Parameters
+    ----------
+    parts
+        The connected parts of the free space; the first is planned on.
+    water
+        The connected water that they lie in.
+    request
+        Its places.
+
+    Raises
+    ------
+    Infeasible
+        A place lies by another basin; `where` names it as `places[i]`.
+    """
+    least_m2 = least_basin_m2(request.safety_m, request.least_width_m)
+    basins = [parts[0], *(part for part in parts[1:] if part.area >= least_m2)]
+    if len(basins) == 1:
+        return
+    routes = Routes(water)
+    for index, place in enumerate(request.places):
+        basin = _first_basin(basins, routes, place)
+        if basin is not basins[0]:
+            raise Infeasible(
+                f"lies by {basin.area:.0f} m2 of free water that only water narrower than twice Safety ="
+                f" {request.safety_m:g} m connects to the largest part, {basins[0].area:.0f} m2; expected a place"
+                " by the largest part, or a smaller Safety",
+                where=f"places[{index}]",
+            )
+
+
+def _first_basin(basins: Sequence[Polygon], routes: Routes, place: Place) -> Polygon:
+    """The basin that is nearest to a place along the water."""
+    berth = shapely.shortest_line(routes.water, Point(place)).interpolate(0.0)
+    nearest = basins[int(np.argmin(shapely.distance(np.array(basins, dtype=object), berth)))]
+    straight = shapely.shortest_line(berth, nearest)
+    if straight.difference(routes.water).length <= ROUNDING_M:
+        return nearest
+    area = MultiPolygon(basins)
+    route = routes.to_area(shapely.get_coordinates(berth)[0], area, routes.goals_in(area))
+    if route is None:
+        return nearest
+    end = Point(route.coords[-1])
+    return basins[int(np.argmin(shapely.distance(np.array(basins, dtype=object), end)))]
