@@ -83,12 +83,12 @@ class Approach:
         return range_m - self._legs_m
 
     def warnings(self, range_m: float) -> tuple[str, ...]:
-        """What is to be known of long legs: shares are balanced by range, not by what legs leave of it."""
+        """What is to be known of long legs: they leave little to survey with."""
         if self._legs_m <= FAR * range_m:
             return ()
         return (
-            f"the way to its share and home takes {self._legs_m / range_m:.0%} of its {range_m:.0f} m: it surveys"
-            " the share at a wider spacing; start it nearer, or give it more length",
+            f"the way to its share and home takes {self._legs_m / range_m:.0%} of its {range_m:.0f} m: start it"
+            " nearer, or give it more length",
         )
 
     @property

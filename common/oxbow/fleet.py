@@ -113,7 +113,8 @@ class TeamPlan:
     @property
     def dropped(self) -> tuple[DroppedPart, ...]:
         """What the paths leave out."""
-        return tuple(part for plan in self.vehicles for part in plan.dropped)
+        of_all = () if self.assignment is None else self.assignment.dropped
+        return of_all + tuple(part for plan in self.vehicles for part in plan.dropped)
 
     @property
     def warnings(self) -> tuple[str, ...]:

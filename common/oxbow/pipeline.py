@@ -187,8 +187,16 @@ def expected_calls(mission: Mission) -> int:
 def _shared(task: Task, team: Sequence[Member]) -> Assignment:
     """Who surveys does a master's work, and has a share, whatever its role."""
     vehicles = tuple(msgspec.structs.replace(member.vehicle, role=Role.MASTER) for member in team)
-    request = AssignRequest(free=task.space.free, vehicles=vehicles, share_free=True, seed=task.options.seed)
-    return task.call(ASSIGN, request)
+    request = AssignRequest(
+        free=task.space.free,
+        water=task.space.water,
+        vehicles=vehicles,
+        share_free=True,
+        seed=task.options.seed,
+    )
+    fields = {f"vehicle {each.vehicle.name!r}: length_m": each.fields["Master_length"] for each in team}
+    with renamed(fields):
+        return task.call(ASSIGN, request)
 
 
 def _shared_part(task: Task, member: Member, harbour: Harbour, share: Polygon) -> VehiclePlan:

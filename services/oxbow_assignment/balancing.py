@@ -10,6 +10,7 @@ and run across narrows.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import networkx as nx
@@ -49,7 +50,7 @@ def border_lengths_m(mesh: Mesh, share: Indices, count: int) -> FloatArray:
     return lengths
 
 
-def balanced_shares(mesh: Mesh, share: Indices, due_m2: FloatArray) -> Indices:
+def balanced_shares(mesh: Mesh, share: Indices, due_m2: FloatArray, allowed: Mask) -> Indices:
     """Shares, each connected, whose areas are nearer to what is due.
 
     Parameters
@@ -60,6 +61,8 @@ def balanced_shares(mesh: Mesh, share: Indices, due_m2: FloatArray) -> Indices:
         To whom every triangle belongs, shape (m,); every share is connected.
     due_m2
         The area that is due to each share; in all, the area of the mesh.
+    allowed : ndarray of bool, shape (k, m)
+        Which triangles each share may take.
 
     Returns
     -------
@@ -73,7 +76,7 @@ def balanced_shares(mesh: Mesh, share: Indices, due_m2: FloatArray) -> Indices:
             break
         least_m2 = TOLERANCE * float(due_m2.min()) / 2
         for giver, taker, area_m2 in _transfers(mesh, share, areas - due_m2, least_m2):
-            moved = _Giver.of(mesh, share, giver, taker).part(area_m2, least_m2)
+            moved = _Giver.of(mesh, share, giver, taker, allowed).part(area_m2, least_m2)
             if moved.any():
                 share = np.where(moved, taker, share)
                 break
@@ -116,15 +119,19 @@ class _Giver:
         Between its triangles: length of their edge over distance of their centroids, shape (n, n).
     outlets
         The same towards the taker, shape (n,).
+    owned, barred
+        Which of the triangles the giver may have, and which the taker must not have, shape (n,).
     """
 
     mesh: Mesh
     triangles: Indices
     conductances: csr_array[np.float64]
     outlets: FloatArray
+    owned: Mask
+    barred: Mask
 
     @classmethod
-    def of(cls, mesh: Mesh, share: Indices, giver: int, taker: int) -> _Giver:
+    def of(cls, mesh: Mesh, share: Indices, giver: int, taker: int, allowed: Mask) -> _Giver:
         triangles = np.flatnonzero(share == giver)
         number = np.full(len(mesh) + 1, -1)
         number[triangles] = np.arange(len(triangles))
@@ -135,24 +142,25 @@ class _Giver:
         size = len(triangles)
         inner = coo_array((conductance[own], (row[own], number[there[own]])), shape=(size, size))
         outlets = np.bincount(row[outward], conductance[outward], minlength=size).astype(float)
-        return cls(mesh, triangles, inner.tocsr(), outlets)
+        return cls(mesh, triangles, inner.tocsr(), outlets, allowed[giver, triangles], ~allowed[taker, triangles])
 
     def part(self, area_m2: float, tolerance_m2: float) -> Mask:
         """The part of about this area to give, shape (m,); it hangs together with the taker, and the rest does."""
         ways = self.mesh.graph[self.triangles][:, self.triangles]
         from_taker_m = dijkstra(ways, indices=np.flatnonzero(self.outlets), min_only=True)
+        from_taker_m = np.where(self.owned, from_taker_m, -1.0)
         farthest = int(np.argmax(from_taker_m))
         best, least_error = np.zeros(len(from_taker_m), dtype=bool), area_m2
         for _ in range(TRIES):
             below, above = self._bracket(farthest, area_m2)
             for given in (below, above):
-                error = abs(self._area(given) - area_m2)
+                error = abs(self._area_m2(given) - area_m2)
                 if error < least_error:
                     best, least_error = given, error
             if least_error <= tolerance_m2:
                 break
             # A dead end changes hands as a whole: the potential is to vary in it.
-            farthest = int(np.argmax(np.where(above & ~below, from_taker_m, -1.0)))
+            farthest = int(np.argmax(np.where(above & ~below, from_taker_m, -2.0)))
         moved = np.zeros(len(self.mesh), dtype=bool)
         moved[self.triangles[best]] = True
         return moved
@@ -165,21 +173,24 @@ class _Giver:
         while high - low > 1:
             middle = (low + high) // 2
             given = self._severed(order[:middle], farthest)
-            if self._area(given) <= area_m2:
+            if self._area_m2(given) <= area_m2:
                 low, below = middle, given
             else:
                 high, above = middle, given
         return below, above
 
-    def _area(self, given: Mask) -> float:
-        return float(self.mesh.areas_m2[self.triangles[given]].sum())
+    def _area_m2(self, given: Mask) -> float:
+        """The area of what is given; infinite where the taker must not have it."""
+        return math.inf if (given & self.barred).any() else float(self.mesh.areas_m2[self.triangles[given]].sum())
 
     def _potential(self, farthest: int) -> FloatArray:
-        """The harmonic potential: 0 beyond the outlets, 1 in the farthest triangle."""
+        """The harmonic potential: 0 beyond the outlets, 1 in the farthest triangle and where it is barred."""
         laplacian = diags_array(self.conductances.sum(axis=1) + self.outlets) - self.conductances
-        free = np.delete(np.arange(len(self.triangles)), farthest)
+        fixed = self.barred.copy()
+        fixed[farthest] = True
+        free = np.flatnonzero(~fixed)
         potential = np.ones(len(self.triangles))
-        inflow = self.conductances[[farthest]].toarray().ravel()[free]
+        inflow: FloatArray = np.asarray(self.conductances[free][:, fixed].sum(axis=1))
         potential[free] = spsolve(laplacian.tocsc()[free][:, free], inflow)
         return potential
 

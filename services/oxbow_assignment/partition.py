@@ -10,13 +10,21 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 from shapely import Polygon
 
-from oxbow.arrays import Indices
+from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray, Place
-from oxbow.errors import Infeasible, InvalidMission
+from oxbow.errors import InvalidMission
 from oxbow.mesh import Mesh, propagate
 from oxbow_assignment.balancing import balanced_shares, border_lengths_m, imbalance
 
-__all__ = ["BALANCE", "Partition", "balanced_partition", "wavefront_partition"]
+__all__ = [
+    "BALANCE",
+    "Partition",
+    "balanced_partition",
+    "due_areas_m2",
+    "largest_piece",
+    "rebalanced",
+    "wavefront_partition",
+]
 
 BALANCE = 0.05
 """How far the area of a share may be from what is due to it, as a share of that."""
@@ -42,7 +50,7 @@ class Partition:
     seeds
         The triangle that each wavefront started from.
     capacities : ndarray, shape (k,)
-        What every vehicle can cover: its length times its speed, in any unit.
+        What every vehicle can cover, in any unit.
     """
 
     mesh: Mesh
@@ -50,6 +58,12 @@ class Partition:
     depth: Indices
     seeds: tuple[int, ...]
     capacities: FloatArray
+
+    @classmethod
+    def of(cls, mesh: Mesh, share: Indices, capacities: FloatArray) -> Partition:
+        """A partition whose waves start from the middles of its shares."""
+        seeds = _middles(mesh, share, len(capacities))
+        return cls(mesh, share, _depth(mesh, share, seeds), tuple(seeds.tolist()), capacities)
 
     @cached_property
     def areas_m2(self) -> FloatArray:
@@ -59,7 +73,7 @@ class Partition:
     @cached_property
     def due_m2(self) -> FloatArray:
         """The area due to every vehicle, in proportion to its capacity, shape (k,)."""
-        return _due_m2(self.mesh, self.capacities)
+        return due_areas_m2(self.mesh, self.share, self.capacities)
 
     @property
     def imbalance(self) -> float:
@@ -94,13 +108,15 @@ def wavefront_partition(mesh: Mesh, starts: Sequence[Place], capacities: FloatAr
         There are no vehicles or more than triangles, or a capacity is not positive.
     """
     capacities = _checked(mesh, starts, capacities)
-    seeds = _spread(mesh, starts)
+    seeds = _spread(mesh, starts, capacities, _everywhere(mesh, starts))
     waves = propagate(mesh, seeds)
     return Partition(mesh, waves.source, waves.depth, tuple(seeds.tolist()), capacities)
 
 
-def balanced_partition(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None = None) -> Partition:
-    """Share a mesh in proportion to capacities, within `BALANCE`, every share connected.
+def balanced_partition(
+    mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None = None, allowed: Mask | None = None
+) -> Partition:
+    """Share a mesh in proportion to capacities, every share connected: within `BALANCE`, or as nearly as can be.
 
     The wavefronts' shares are balanced (`oxbow_assignment.balancing`), their seeds move to their middles, and so
     on; of all rounds, the shares with the shortest borders are taken. Where triangles are too large for balance,
@@ -113,31 +129,32 @@ def balanced_partition(mesh: Mesh, starts: Sequence[Place], capacities: FloatArr
     starts
         Where each vehicle starts from, in planar metres; equal starts are spread.
     capacities
-        Length times speed of each vehicle; all equal where absent.
+        What each vehicle can cover; all equal where absent.
+    allowed : ndarray of bool, shape (k, m)
+        Which triangles each vehicle may have, at least one each; all where absent. A triangle that none of its
+        neighbours' vehicles may have stays where it is all the same.
 
     Raises
     ------
     InvalidMission
         There are no vehicles or more than triangles, or a capacity is not positive.
-    Infeasible
-        No division of the mesh balanced the shares.
     """
     capacities = _checked(mesh, starts, capacities)
-    due_m2 = _due_m2(mesh, capacities)
-    share = min(_rounds(mesh, _spread(mesh, starts), due_m2), key=partial(_badness, mesh, due_m2=due_m2))
-    for _ in range(SUBDIVISIONS):
-        if _imbalance(mesh, share, due_m2) <= BALANCE:
+    allowed = _everywhere(mesh, starts) if allowed is None else allowed
+    seeds = _spread(mesh, starts, capacities, allowed)
+    share = min(_rounds(mesh, seeds, capacities, allowed), key=partial(_badness, mesh, capacities=capacities))
+    for _ in range(SUBDIVISIONS if allowed.all() else 0):
+        if _imbalance(mesh, share, capacities) <= BALANCE:
             break
-        mesh, share = mesh.subdivided(), np.repeat(share, 4)
-        share = balanced_shares(mesh, share, due_m2)
-    if (found := _imbalance(mesh, share, due_m2)) > BALANCE:
-        raise Infeasible(
-            f"are {len(starts)}, whose shares are up to {found:.0%} from what is due; expected at most"
-            f" {BALANCE:.0%}: fewer vehicles, or capacities less far apart",
-            where="Vehicles",
-        )
-    seeds = _middles(mesh, share, len(starts))
-    return Partition(mesh, share, _depth(mesh, share, seeds), tuple(seeds.tolist()), capacities)
+        mesh, share, allowed = mesh.subdivided(), np.repeat(share, 4), np.repeat(allowed, 4, axis=1)
+        share = _balanced(mesh, share, capacities, allowed)
+    return Partition.of(mesh, share, capacities)
+
+
+def rebalanced(partition: Partition, capacities: FloatArray, allowed: Mask) -> Partition:
+    """A partition with its borders moved as other capacities ask for; see `balanced_partition`."""
+    share = _balanced(partition.mesh, partition.share, capacities, allowed)
+    return Partition.of(partition.mesh, share, capacities)
 
 
 def _checked(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None) -> FloatArray:
@@ -152,27 +169,77 @@ def _checked(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None)
     return capacities
 
 
-def _due_m2(mesh: Mesh, capacities: FloatArray) -> FloatArray:
-    return np.asarray(mesh.areas_m2.sum() * capacities / capacities.sum())
+def _everywhere(mesh: Mesh, starts: Sequence[Place]) -> Mask:
+    return np.ones((len(starts), len(mesh)), dtype=bool)
 
 
-def _rounds(mesh: Mesh, seeds: Indices, due_m2: FloatArray) -> Iterator[Indices]:
+def due_areas_m2(mesh: Mesh, share: Indices, capacities: FloatArray) -> FloatArray:
+    """The area due to every share in proportion to capacities, shape (k,).
+
+    Pieces of the mesh that do not hang together are each shared by those who are there.
+    """
+    piece = mesh.pieces[np.unique(share, return_index=True)[1]]
+    areas_m2 = np.bincount(mesh.pieces, mesh.areas_m2)
+    return np.asarray(areas_m2[piece] * capacities / np.bincount(piece, capacities)[piece])
+
+
+def _rounds(mesh: Mesh, seeds: Indices, capacities: FloatArray, allowed: Mask) -> Iterator[Indices]:
     """Balanced shares from the given seeds, and from seeds that move to their middles."""
     for _ in range(ROUNDS):
-        share = balanced_shares(mesh, propagate(mesh, seeds).source, due_m2)
+        share = _balanced(mesh, propagate(mesh, seeds).source, capacities, allowed)
         yield share
-        seeds, before = _middles(mesh, share, len(due_m2)), seeds
+        middles, before = _middles(mesh, share, len(capacities)), seeds
+        seeds = np.where(allowed[np.arange(len(seeds)), middles], middles, seeds)
         if (seeds == before).all():
             break
 
 
-def _imbalance(mesh: Mesh, share: Indices, due_m2: FloatArray) -> float:
-    return imbalance(np.bincount(share, mesh.areas_m2, minlength=len(due_m2)).astype(float), due_m2)
+def _balanced(mesh: Mesh, share: Indices, capacities: FloatArray, allowed: Mask) -> Indices:
+    """Shares of allowed triangles, as far as that can be, balanced."""
+    share = _within_reach(mesh, share, allowed)
+    share = balanced_shares(mesh, share, due_areas_m2(mesh, share, capacities), allowed)
+    return _within_reach(mesh, share, allowed)
 
 
-def _badness(mesh: Mesh, share: Indices, *, due_m2: FloatArray) -> tuple[float, float]:
+def _within_reach(mesh: Mesh, share: Indices, allowed: Mask) -> Indices:
+    """Shares without what is not allowed, and what that cuts off; neighbours have it, where they may.
+
+    Every share keeps its largest connected part of allowed triangles, one at least.
+    """
+    if allowed.all():
+        return share
+    kept = np.zeros(len(mesh), dtype=bool)
+    for vehicle, own in enumerate(allowed):
+        kept |= largest_piece(mesh, own & (share == vehicle))
+    while (~kept).any():
+        triangle, side = np.nonzero((mesh.neighbours >= 0) & ~kept[:, None])
+        beside = mesh.neighbours[triangle, side]
+        takes = kept[beside] & allowed[share[beside], triangle]
+        taken, first = np.unique(triangle[takes], return_index=True)
+        if not len(taken):
+            break
+        share = share.copy()
+        share[taken], kept[taken] = share[beside[takes][first]], True
+    return share
+
+
+def largest_piece(mesh: Mesh, which: Mask) -> Mask:
+    """Of some triangles, those of the connected piece with the greatest area."""
+    pieces = mesh.part(which).pieces
+    largest = np.zeros(len(mesh), dtype=bool)
+    largest[which] = pieces == np.argmax(np.bincount(pieces, mesh.areas_m2[which], minlength=1))
+    return largest
+
+
+def _imbalance(mesh: Mesh, share: Indices, capacities: FloatArray) -> float:
+    areas_m2 = np.bincount(share, mesh.areas_m2, minlength=len(capacities)).astype(float)
+    return imbalance(areas_m2, due_areas_m2(mesh, share, capacities))
+
+
+def _badness(mesh: Mesh, share: Indices, *, capacities: FloatArray) -> tuple[float, float]:
     """Balance first, where it is not good enough; then the length of all borders."""
-    return max(_imbalance(mesh, share, due_m2), BALANCE), float(border_lengths_m(mesh, share, len(due_m2)).sum())
+    borders_m = border_lengths_m(mesh, share, len(capacities))
+    return max(_imbalance(mesh, share, capacities), BALANCE), float(borders_m.sum())
 
 
 def _depth(mesh: Mesh, share: Indices, seeds: Indices) -> Indices:
@@ -184,16 +251,29 @@ def _depth(mesh: Mesh, share: Indices, seeds: Indices) -> Indices:
     return depth
 
 
-def _spread(mesh: Mesh, starts: Sequence[Place]) -> Indices:
-    """A triangle for each vehicle: that of its start, or else the one farthest by water from those taken."""
+def _spread(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray, allowed: Mask) -> Indices:
+    """A triangle for each vehicle: that of its start, or else the one farthest by water from those taken.
+
+    Of vehicles that start together, those of least reach and capacity are served first, so that the others have
+    what is far away.
+    """
     wanted = mesh.located(np.asarray(starts, dtype=float))
-    first = np.unique(wanted, return_index=True)[1]
+    order = np.lexsort([capacities, allowed @ mesh.areas_m2])
     seeds = np.full(len(wanted), -1)
+    first = order[np.unique(wanted[order], return_index=True)[1]]
+    first = first[allowed[first, wanted[first]]]
     seeds[first] = wanted[first]
-    for vehicle in np.flatnonzero(seeds < 0):
-        distance = dijkstra(mesh.graph, indices=seeds[seeds >= 0], min_only=True)
-        seeds[vehicle] = int(np.argmax(distance))
+    for vehicle in order[seeds[order] < 0]:
+        distance = _distance_from(mesh, seeds[seeds >= 0])
+        seeds[vehicle] = int(np.argmax(np.where(allowed[vehicle], distance, -1.0)))
     return seeds
+
+
+def _distance_from(mesh: Mesh, triangles: Indices) -> FloatArray:
+    """Metres by water from the nearest of some triangles, shape (m,); the same everywhere where there are none."""
+    if not len(triangles):
+        return np.zeros(len(mesh))
+    return np.asarray(dijkstra(mesh.graph, indices=triangles, min_only=True))
 
 
 def _middles(mesh: Mesh, share: Indices, count: int) -> Indices:

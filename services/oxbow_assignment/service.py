@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from msgspec import structs
+
 from oxbow.contracts import Assignment, AssignRequest, Role, Share, Sortie, Vehicle
 from oxbow.recording import Show
 from oxbow.route import Danger
@@ -23,12 +25,12 @@ def handle(request: AssignRequest, show: Show) -> Assignment:
     InvalidMission
         There is nobody to do what is asked for, hot spots overlap, or a figure is out of proportion.
     Infeasible
-        A slave cannot reach the free space, or no shares are balanced.
+        A vehicle cannot reach the free space and be home within its range.
     """
     # 1. Shares of the free space, each connected.
-    shares, imbalance = _shares(request, show) if request.share_free else ((), 0.0)
+    reply = _shared(request, show) if request.share_free else Assignment()
     if not request.hot_spots or request.swath_m is None:
-        return Assignment(shares=shares, imbalance=imbalance)
+        return reply
 
     # 2. Passes over every hot spot, in parts that fit, shared among the slaves, round after round.
     slaves = _with_role(request.vehicles, Role.SLAVE)
@@ -49,29 +51,31 @@ def handle(request: AssignRequest, show: Show) -> Assignment:
     further = tuple(sortie for journeys in others for sortie in _sorties(journeys, campaign))
     show_campaign(request.hot_spots, campaign, sorties, further, show)
     solution = campaign.schedule.first
-    return Assignment(
-        shares=shares,
-        imbalance=imbalance,
+    return structs.replace(
+        reply,
         sorties=sorties,
         further=further,
         left=campaign.left,
         treated_share=campaign.treated_share(first, request.swath_m),
         makespan_s=max((sortie.duration_s for sortie in sorties), default=0.0),
         joint_gap=None if solution is None else solution.gap.relative,
-        warnings=campaign.warnings,
+        warnings=reply.warnings + campaign.warnings,
     )
 
 
-def _shares(request: AssignRequest, show: Show) -> tuple[tuple[Share, ...], float]:
+def _shared(request: AssignRequest, show: Show) -> Assignment:
+    """The free space shared among the masters."""
     masters = _with_role(request.vehicles, Role.MASTER)
-    sharing = shared(request.free, masters, request.footprint_m)
+    sharing = shared(request.free, masters, request.footprint_m, request.water)
     shares = tuple(
         Share(vehicle=master.name, area=area) for master, area in zip(masters, sharing.areas, strict=True)
     )
     if sharing.partition is not None:
         show_partition(sharing.partition, show)
     show_shares(shares, show)
-    return shares, sharing.imbalance
+    return Assignment(
+        shares=shares, imbalance=sharing.imbalance, dropped=sharing.dropped, warnings=sharing.warnings
+    )
 
 
 def _with_role(vehicles: Sequence[Vehicle], role: Role) -> tuple[Vehicle, ...]:

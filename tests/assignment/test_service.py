@@ -194,13 +194,13 @@ def test_the_faster_boat_saves_time():
 @given(seed=st.integers(0, 10_000), masters=st.integers(2, 8), spread=st.floats(1.0, 5.0))
 def test_shares_of_lakes_tile_them(seed, masters, spread):
     free, rng = lake(seed), np.random.default_rng(seed)
-    lengths = rng.uniform(1.0, spread, masters)
+    lengths = 1e6 * rng.uniform(1.0, spread, masters)
     fleet = tuple(master((0.0, 0.0), name=f"{n}", length_m=length) for n, length in enumerate(lengths.tolist()))
     require_shares(AssignRequest(free=free, vehicles=fleet, share_free=True))
 
 
 def require_shares(request: AssignRequest) -> None:
-    """Shares are connected, balanced, each its master's, and together the free space."""
+    """Shares are connected, balanced, each its master's, and together the free space: ranges are ample."""
     found = reply(request)
     masters = [vehicle for vehicle in request.vehicles if vehicle.role == "master"]
     assert [share.vehicle for share in found.shares] == [vehicle.name for vehicle in masters]
@@ -209,10 +209,11 @@ def require_shares(request: AssignRequest) -> None:
     covered = shapely.union_all(areas)
     assert covered.symmetric_difference(request.free).area <= 1e-9 * request.free.area
     assert sum(area.area for area in areas) == pytest.approx(request.free.area, rel=1e-9)
-    due = np.array([vehicle.length_m * vehicle.speed_mps for vehicle in masters])
+    assert not found.dropped
+    due = np.array([vehicle.length_m for vehicle in masters])
     deviation = np.abs(shapely.area(areas) / (request.free.area * due / due.sum()) - 1.0).max()
-    assert found.imbalance == pytest.approx(deviation, abs=1e-6)
-    assert deviation <= BALANCE
+    assert found.imbalance == pytest.approx(deviation, abs=0.01)
+    assert found.imbalance <= BALANCE
 
 
 @needs_missions
@@ -227,7 +228,7 @@ def test_real_lakes_are_shared_and_treated(path):
         discard,
     ).free
     rng, scale_m = np.random.default_rng(1), free.area**0.5
-    masters = tuple(master(site.launch, name=f"master {n}", length_m=1e4 * (1 + n)) for n in range(3))
+    masters = tuple(master(site.launch, name=f"master {n}", length_m=1e9 * (1 + n)) for n in range(3))
     slaves = tuple(slave(site.launch, name=f"slave {n}", length_m=4 * scale_m) for n in range(2))
     request = AssignRequest(
         free=free,

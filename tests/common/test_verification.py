@@ -132,8 +132,9 @@ def test_a_false_share_is_refused(change):
 
 def test_the_error_names_the_vehicle_the_place_and_the_metres():
     lying = Lying(**{PATH.stage: off_the_lake, CERTIFY.stage: praised})
+    fleet = [FLEET[0], FLEET[1] | {"Start": at(380, 180), "Recovery": at(380, 180)}]
     with pytest.raises(Internal, match=r"a: path: .* m outside the water.*, at lat 46\.00\d+, long 2\.00\d+"):
-        plan_mission(pond(Vehicles=FLEET), OPTIONS, call=lying)
+        plan_mission(pond(Vehicles=fleet), OPTIONS, call=lying)
 
 
 def test_the_truth_passes():

@@ -7,6 +7,7 @@ import math
 
 from shapely import LineString, Polygon
 
+from oxbow.contracts.contour import DroppedPart
 from oxbow.contracts.danger import DANGER_DETOUR_M, DangerZone
 from oxbow.contracts.message import (
     MOST_LENGTH_M,
@@ -102,7 +103,7 @@ class AssignRequest(Message, frozen=True, kw_only=True):
     vehicles
         The fleet.
     share_free
-        Whether the free space is to be shared among the masters, in proportion to length times speed.
+        Whether the free space is to be shared among the masters, in proportion to the range that their ways leave.
     footprint_m
         Edge of the triangles that shares are made of; chosen by the stage where it is absent.
     hot_spots
@@ -184,9 +185,12 @@ class Assignment(Message, frozen=True, kw_only=True):
     Parameters
     ----------
     shares
-        One a master, where the free space was to be shared. Together they are the free space.
+        One a master, where the free space was to be shared. Together with what is dropped they are the free space.
     imbalance
-        The largest deviation of a share's area from what its vehicle's capacity asks for, as a part of that.
+        The largest deviation of a share's area from what is due to it, as a part of that. Due to a vehicle is area
+        in proportion to what of its range the way to its share and home leaves.
+    dropped
+        Water that no master can see and be home within its range.
     sorties
         The first journey of every slave that has one, within its range.
     further
@@ -203,6 +207,7 @@ class Assignment(Message, frozen=True, kw_only=True):
 
     shares: tuple[Share, ...] = ()
     imbalance: float = 0.0
+    dropped: tuple[DroppedPart, ...] = ()
     sorties: tuple[Sortie, ...] = ()
     further: tuple[Sortie, ...] = ()
     left: tuple[LeftSpot, ...] = ()

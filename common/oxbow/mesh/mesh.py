@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import shapely
 from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 from shapely import Polygon
 
 from oxbow.arrays import Geometries, Indices, Mask
@@ -128,6 +129,16 @@ class Mesh:
         half = np.hypot(*(self.centroids[triangle] - self.edge_middles[triangle, side]).T)
         one_way = csr_array((half, (triangle, self.neighbours[triangle, side])), shape=(len(self), len(self)))
         return csr_array(one_way + one_way.T)
+
+    @cached_property
+    def pieces(self) -> Indices:
+        """The number of the connected piece that each triangle belongs to, shape (m,)."""
+        return np.asarray(connected_components(self.graph, directed=False)[1])
+
+    def part(self, which: Mask) -> Mesh:
+        """Some of the triangles, as a mesh of their own; in the same order."""
+        rank = np.append(np.where(which, np.cumsum(which) - 1, -1), -1)
+        return Mesh(self.points, self.triangles[which], rank[self.neighbours[which]])
 
     def subdivided(self) -> Mesh:
         """Every triangle t divided in four of its shape, 4 t to 4 t + 3, at the middles of its edges."""

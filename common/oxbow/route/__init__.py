@@ -3,6 +3,7 @@
 from oxbow.route.access import Landing, way_to
 from oxbow.route.danger import NO_DANGER, Danger
 from oxbow.route.dynamic import DynamicRouter
+from oxbow.route.field import lengths_from
 from oxbow.route.gate_routes import Routes
 from oxbow.route.methods import make_router
 from oxbow.route.route import Route, RouteMethod, Router
@@ -16,6 +17,7 @@ __all__ = [
     "RouteMethod",
     "Router",
     "Routes",
+    "lengths_from",
     "make_router",
     "way_to",
 ]

@@ -62,9 +62,8 @@ class VisibilityGraph:
         """See `Network.arcs`: between bends that see each other."""
         bends = self.bends
         nobody = np.empty(0, dtype=np.intp)
-        at = Touches(bends.at_corner[bends.corners], bends.corners // 3)
         wanted = bends.at_corner >= 0
-        seen = sights(self.mesh, bends.places, at, np.empty((0, 2)), Touches(nobody, nobody), wanted)
+        seen = sights(self.mesh, bends.places, bends.touches, np.empty((0, 2)), Touches(nobody, nobody), wanted)
         a, b = seen.corner_eyes, bends.at_corner[seen.corners]
         useful = bends.can_be_reached(bends.places[a], b) & bends.can_be_reached(bends.places[b], a)
         return Arcs.both_ways(bends.places, np.column_stack([a, b])[useful], self.danger)
@@ -117,6 +116,11 @@ class Bends:
             after[begins[begins >= 0]] = mesh.heads[mesh.shore[begins >= 0]]
             before[ends[ends >= 0]] = mesh.tails[mesh.shore[ends >= 0]]
         return cls(places, corners, at_corner, before, after)
+
+    @property
+    def touches(self) -> Touches:
+        """The triangles that bends touch."""
+        return Touches(self.at_corner[self.corners], self.corners // 3)
 
     def can_be_reached(self, starts: FloatArray, bends: Indices) -> Mask:
         """Whether straight lines from `starts`, shape (n, 2), touch the shore at bends without leading into it."""
