@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 from oxbow.contracts import Endpoint, Message
+from oxbow.errors import Internal
 from oxbow.recording import Show, discard
 
 __all__ = ["Handler", "LocalCall"]
@@ -36,5 +37,5 @@ class LocalCall:
         reply = self.handlers[endpoint.stage](request, self.show)
         if not isinstance(reply, endpoint.reply):
             expected = endpoint.reply.__name__
-            raise TypeError(f"{endpoint.stage} replied a {type(reply).__name__}, not a {expected}")
+            raise Internal(f"replied a {type(reply).__name__}, not a {expected}", where=endpoint.stage)
         return reply

@@ -100,7 +100,7 @@ def plan(
         str, typer.Option(help="How SpaceFillingCurve draws its inputs: low-discrepancy or convex-combination.")
     ] = "low-discrepancy",
     timeout: Annotated[
-        float, typer.Option(metavar="S", min=0.001, max=1e6, help="Give up after so many seconds.")
+        float, typer.Option(metavar="S", min=0.001, max=86_400, help="Give up after so many seconds.")
     ] = 300.0,
     home: Home = None,
     json: AsJson = False,

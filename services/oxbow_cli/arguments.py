@@ -14,7 +14,7 @@ from typing import TypeVar
 import msgspec
 
 from oxbow.bus import DEFAULT_ENDPOINT
-from oxbow.contracts import Draw, Method
+from oxbow.contracts import MOST_DEADLINE_S, Draw, Method
 from oxbow.errors import InvalidMission, OxbowError, renamed
 from oxbow.frame import Position
 from oxbow.mission import Mission, read_mission, write_mission
@@ -98,7 +98,11 @@ def replica_counts(texts: Iterable[str]) -> dict[str, int]:
 def require_compatible(
     *, local: bool, connect: str | None, record: Path | None, time_limit_s: float | None, timeout_s: float
 ) -> None:
-    """Refuse options that contradict one another."""
+    """Refuse options that contradict one another, and a time in which nothing could end."""
+    if not 0.0 < timeout_s <= MOST_DEADLINE_S:
+        raise InvalidMission(
+            f"is {timeout_s:g} s; expected more than 0 s and at most {MOST_DEADLINE_S:g} s", where="--timeout"
+        )
     if time_limit_s is not None and time_limit_s >= timeout_s:
         raise InvalidMission(
             f"is {time_limit_s:g} s; expected less than --timeout, {timeout_s:g} s", "--time-limit"

@@ -17,6 +17,7 @@ from oxbow.contracts import ANY_LIVE, MAX_REQUEST_BYTES, Endpoint, Message, live
 from oxbow.envelope import Envelope
 from oxbow.errors import Busy, DeadlineExceeded, ErrorCode, Internal, InvalidMission, OxbowError, Unavailable
 from oxbow.ids import MOST_ID_CHARACTERS
+from oxbow.waits import checked_wait
 
 __all__ = ["Bus", "BusCall"]
 
@@ -68,7 +69,7 @@ class Bus(Session):
         Unavailable
             Some have none after `timeout_s`; the message names them.
         """
-        missing = self.replicas.wait_alive(tuple(stages), timeout_s)
+        missing = self.replicas.wait_alive(tuple(stages), checked_wait(timeout_s, "timeout_s"))
         if missing:
             raise Unavailable(f"no live {', '.join(missing)} after {timeout_s:g} s", where=self.endpoint)
 

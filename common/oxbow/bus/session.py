@@ -77,7 +77,7 @@ class Session(Closing):
         Unavailable
             Nothing answered at `endpoint` within `timeout_s`.
         """
-        give_up = time.monotonic() + timeout_s
+        give_up = time.monotonic() + checked_wait(timeout_s, "timeout_s")
         while True:
             # zenoh.open is deaf to signals: short attempts keep Ctrl-C working.
             attempt_s = min(OPEN_ATTEMPT_S, max(0.1, give_up - time.monotonic()))

@@ -138,6 +138,9 @@ class Leg(Message, frozen=True, kw_only=True):
     least_ashore_m: float
     most_unsafe_m: float
 
+    def __post_init__(self) -> None:
+        require_finite(self, "unsafe_m", "ashore_m", "least_ashore_m", "most_unsafe_m", least=0.0)
+
 
 class Conformance(Message, frozen=True, kw_only=True):
     """What there is of a path, and whether it keeps the rules; defined in `docs/quality.md`.
