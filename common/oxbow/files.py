@@ -4,23 +4,54 @@ from __future__ import annotations
 
 import os
 import secrets
+import shutil
 import stat
 from pathlib import Path
 
 from oxbow.errors import InvalidMission
 
-__all__ = ["read_bytes", "write_atomically"]
+__all__ = ["move_into_place", "read_bytes", "write_atomically"]
+
+_PIPE_BYTES = 65_536
 
 
 def read_bytes(path: Path, limit: int) -> bytes:
-    """A file's content; `InvalidMission` where it cannot be read or holds more than `limit` bytes."""
+    """A file's content.
+
+    Of a pipe, what is written to it until its end; a device, or a pipe that nobody writes to, is refused rather
+    than waited for.
+
+    Raises
+    ------
+    InvalidMission
+        It cannot be read, or holds more than `limit` bytes.
+    """
     try:
-        with path.open("rb") as file:
-            data = file.read(limit + 1)
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+        with open(descriptor, "rb") as file:  # noqa: PTH123 - what is open already
+            data = _begun(descriptor, str(path))
+            os.set_blocking(descriptor, True)
+            data += file.read(limit + 1 - len(data))
     except OSError as error:
         raise InvalidMission(f"cannot be read: {error.strerror}", where=str(path)) from error
     if len(data) > limit:
         raise InvalidMission(f"is larger than {limit} bytes", where=str(path))
+    return data
+
+
+def _begun(descriptor: int, name: str) -> bytes:
+    """What a pipe holds now; nothing of a regular file. What could be waited for without end is refused."""
+    mode = os.fstat(descriptor).st_mode
+    if stat.S_ISCHR(mode) or stat.S_ISBLK(mode):
+        raise InvalidMission("cannot be read: is a device; expected a file", where=name)
+    if not stat.S_ISFIFO(mode):
+        return b""
+    try:
+        data = os.read(descriptor, _PIPE_BYTES)
+    except BlockingIOError:  # there is a writer
+        return b""
+    if not data:
+        raise InvalidMission("cannot be read: is a pipe that nobody writes to", where=name)
     return data
 
 
@@ -50,6 +81,22 @@ def write_atomically(path: Path, data: bytes) -> None:
     finally:
         scratch.unlink(missing_ok=True)
     _sync_folder(target.parent)
+
+
+def move_into_place(source: Path, target: Path) -> None:
+    """Move a file, to another file system too, in one step for those who read the target.
+
+    Raises
+    ------
+    OSError
+        It cannot be moved; what was there stays, and nothing is left beside it.
+    """
+    scratch = target.with_name(f".oxbow-{secrets.token_hex(8)}.tmp")
+    try:
+        shutil.move(source, scratch)
+        scratch.replace(target)
+    finally:
+        scratch.unlink(missing_ok=True)
 
 
 def _sync_folder(folder: Path) -> None:

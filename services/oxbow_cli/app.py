@@ -91,7 +91,6 @@ def plan(
         float | None,
         typer.Option(
             metavar="S",
-            min=0.001,
             help="Improve the path for so many seconds at most, in place of a fixed amount of work.",
         ),
     ] = None,
@@ -100,7 +99,7 @@ def plan(
         str, typer.Option(help="How SpaceFillingCurve draws its inputs: low-discrepancy or convex-combination.")
     ] = "low-discrepancy",
     timeout: Annotated[
-        float, typer.Option(metavar="S", min=0.001, max=86_400, help="Give up after so many seconds.")
+        float, typer.Option(metavar="S", help="Give up after so many seconds, a day at most.")
     ] = 300.0,
     home: Home = None,
     json: AsJson = False,
@@ -118,38 +117,41 @@ def plan(
     - `oxbow plan lake.json --connect tcp/127.0.0.1:7447`: on a stack that `oxbow up` keeps running
     - `oxbow plan lake.json --prior blooms.geojson --time-limit 10`
     """
+    from oxbow.mission import mission_json
     from oxbow_cli import report
     from oxbow_cli.arguments import (
         endpoint,
         plan_options,
         read,
         require_compatible,
-        require_place,
-        save,
         with_prior,
     )
+    from oxbow_cli.destination import Destination, writing
     from oxbow_cli.home import recordings_folder
     from oxbow_cli.planning import Job, plan_embedded, plan_here, plan_on
 
     require_compatible(local=local, connect=connect, record=record, time_limit_s=time_limit, timeout_s=timeout)
-    require_place(output or file)
+    completed = Destination.of(output or file, inputs=[prior])
     mission = with_prior(read(file), prior)
+    if record is not None:
+        with writing(record):
+            record.parent.mkdir(parents=True, exist_ok=True)
+        Destination.of(record, inputs=[file, completed.path, prior])
     options = plan_options(
         method, seed=seed, heading_deg=heading, time_limit_s=time_limit, smooth=smooth, draw=draw
     )
     with report.progress_bar(shown=not json) as progress:
-        job = Job(mission, options, timeout, progress)
+        job = Job(mission, options, timeout, progress, keep=lambda planned: completed.keep(mission_json(planned)))
         if local:
             planned = plan_here(job)
         elif connect is not None:
             planned = plan_on(job, endpoint(connect, "--connect"))
         else:
             planned = plan_embedded(job, record, recordings_folder(home))
-    save(output or file, planned.mission)
     if json:
-        report.print_json(report.plan_document(planned, output or file))
+        report.print_json(report.plan_document(planned, completed.path))
     else:
-        report.print_plan(planned, output or file)
+        report.print_plan(planned, completed.path)
 
 
 @app.command()
@@ -271,8 +273,10 @@ def import_site(
     from oxbow.files import read_bytes
     from oxbow.geojson import DOCUMENT, mission_from_geojson
     from oxbow.mission import mission_json
-    from oxbow_cli.arguments import position, save
+    from oxbow_cli.arguments import position
+    from oxbow_cli.destination import Destination
 
+    destination = None if output is None else Destination.of(output, inputs=[site])
     with renamed({DOCUMENT: str(site), f"{DOCUMENT}.type": f"{site}: type"}):
         imported = mission_from_geojson(
             read_bytes(site, MAX_REQUEST_BYTES),
@@ -286,10 +290,11 @@ def import_site(
         )
     for note in imported.notes:
         print(f"note: {note}", file=sys.stderr)
-    if output is None:
-        print(mission_json(imported.mission).decode(), end="")
+    document = mission_json(imported.mission)
+    if destination is None:
+        print(document.decode(), end="")
     else:
-        save(output, imported.mission)
+        destination.write(document)
 
 
 @app.command()
@@ -307,10 +312,12 @@ def picture(
     - `oxbow picture lake.json -o lake.png`
     - `oxbow picture lake.json --gaps -o gaps.png`
     """
-    from oxbow_cli.arguments import read, writing
+    from oxbow_cli.arguments import read
+    from oxbow_cli.destination import Destination, writing
     from oxbow_cli.gaps import draw_gaps
     from oxbow_cli.picture import draw
 
+    Destination.of(output, inputs=[file])
     mission = read(file)
     with writing(output):
         (draw_gaps if gaps else draw)(mission, output)

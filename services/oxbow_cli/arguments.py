@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import enum
 import math
-import os
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -17,7 +16,7 @@ from oxbow.bus import DEFAULT_ENDPOINT
 from oxbow.contracts import MOST_DEADLINE_S, Draw, Method
 from oxbow.errors import InvalidMission, OxbowError, renamed
 from oxbow.frame import Position
-from oxbow.mission import Mission, read_mission, write_mission
+from oxbow.mission import Mission, read_mission
 from oxbow.plan import PlanOptions
 from oxbow.prior_file import read_prior
 
@@ -31,12 +30,12 @@ __all__ = [
     "read",
     "replica_counts",
     "require_compatible",
-    "require_place",
-    "save",
     "with_prior",
-    "writing",
 ]
 
+
+LEAST_S = 0.001
+"""Of a time limit: an alarm can be set for no less."""
 
 _ENDPOINT = re.compile(r"[a-z][a-z0-9_-]*/\S+")
 
@@ -98,11 +97,10 @@ def replica_counts(texts: Iterable[str]) -> dict[str, int]:
 def require_compatible(
     *, local: bool, connect: str | None, record: Path | None, time_limit_s: float | None, timeout_s: float
 ) -> None:
-    """Refuse options that contradict one another, and a time in which nothing could end."""
-    if not 0.0 < timeout_s <= MOST_DEADLINE_S:
-        raise InvalidMission(
-            f"is {timeout_s:g} s; expected more than 0 s and at most {MOST_DEADLINE_S:g} s", where="--timeout"
-        )
+    """Refuse options that contradict one another, or ask for a time that is none."""
+    _require_seconds("--timeout", timeout_s)
+    if time_limit_s is not None:
+        _require_seconds("--time-limit", time_limit_s)
     if time_limit_s is not None and time_limit_s >= timeout_s:
         raise InvalidMission(
             f"is {time_limit_s:g} s; expected less than --timeout, {timeout_s:g} s", "--time-limit"
@@ -118,6 +116,11 @@ def require_compatible(
         raise InvalidMission(f"is {str(record)!r}; expected a name that ends in .rrd", where="--record")
 
 
+def _require_seconds(where: str, value: float) -> None:
+    if not LEAST_S <= value <= MOST_DEADLINE_S:
+        raise InvalidMission(f"is {value!r}; expected seconds, {LEAST_S:g} to {MOST_DEADLINE_S:g}", where=where)
+
+
 def read(path: Path) -> Mission:
     """The mission in a file; an error about the file as a whole has its name."""
     with renamed({"Mission File": str(path)}):
@@ -131,27 +134,3 @@ def naming(file: str) -> Iterator[None]:
         yield
     except OxbowError as error:
         raise type(error)(error.message, file if error.where == file else f"{file}: {error.where}") from error
-
-
-def require_place(path: Path) -> None:
-    """Refuse what cannot be written before a plan is made for it."""
-    if path.is_dir():
-        raise InvalidMission("cannot be written: is a folder; expected the name of a file", where=str(path))
-    if not os.access(path.parent, os.W_OK | os.X_OK):
-        folder = "cannot be written to" if path.parent.is_dir() else "does not exist"
-        raise InvalidMission(f"cannot be written: the folder {str(path.parent)!r} {folder}", where=str(path))
-
-
-def save(path: Path, mission: Mission) -> None:
-    """Write a Mission File as a whole, or leave the old one as it was."""
-    with writing(path):
-        write_mission(path, mission)
-
-
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Report a file that cannot be written as a fault of what was asked."""
-    try:
-        yield
-    except OSError as error:
-        raise InvalidMission(f"cannot be written: {error.strerror or error}", where=str(path)) from error

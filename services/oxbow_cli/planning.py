@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import os
-import shutil
 import signal
 import subprocess
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,18 +16,21 @@ from typing import TypeVar
 from oxbow.client import Client
 from oxbow.contracts import Endpoint, Message, MissionStatus
 from oxbow.errors import DeadlineExceeded
+from oxbow.files import move_into_place
 from oxbow.mission import Mission
 from oxbow.pipeline import Call, expected_calls, plan_mission
 from oxbow.plan import PlanOptions
-from oxbow_cli.arguments import writing
 from oxbow_cli.exits import DEBUG
 from oxbow_cli.local import local_call
+from oxbow_cli.scratch import scratch_folder
 from oxbow_cli.stack import StackSettings, free_endpoint, running_stack
 
 __all__ = ["Job", "Planned", "Progress", "plan_embedded", "plan_here", "plan_on"]
 
 CONNECT_S = 3.0
 """How long a router and a mission service may take to answer; where they are up, they do in milliseconds."""
+
+_log = logging.getLogger(__name__)
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
@@ -39,12 +41,16 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Job:
-    """A mission to plan, how, for how long, and whom to tell how far it is."""
+    """A mission to plan, how, for how long, whom to tell how far it is, and what to do with the plan.
+
+    `keep` is called with the completed mission as soon as there is one, before anything else can fail.
+    """
 
     mission: Mission
     options: PlanOptions
     timeout_s: float
     progress: Progress
+    keep: Callable[[Mission], None]
 
 
 @dataclass(frozen=True)
@@ -59,7 +65,9 @@ def plan_here(job: Job) -> Planned:
     """Plan in this process, without a bus and without a recording."""
     with _deadline(job.timeout_s):
         call = _Reported(local_call(), job.progress, expected_calls(job.mission))
-        return Planned(plan_mission(job.mission, job.options, call=call))
+        planned = plan_mission(job.mission, job.options, call=call)
+    job.keep(planned)
+    return Planned(planned)
 
 
 def plan_on(job: Job, endpoint: str) -> Planned:
@@ -69,7 +77,7 @@ def plan_on(job: Job, endpoint: str) -> Planned:
         job.progress(status.stage or status.state, status.fraction)
 
     options = job.options
-    with Client(endpoint, timeout_s=CONNECT_S) as client:
+    with _named_timeout(job.timeout_s), Client(endpoint, timeout_s=CONNECT_S) as client:
         planned = client.plan(
             job.mission,
             timeout_s=job.timeout_s,
@@ -81,6 +89,7 @@ def plan_on(job: Job, endpoint: str) -> Planned:
             smooth=options.smooth,
             draw=options.draw,
         )
+    job.keep(planned)
     return Planned(planned)
 
 
@@ -92,19 +101,27 @@ def plan_embedded(job: Job, recording: Path | None, recordings: Path) -> Planned
     recording
         Where the recording goes; where absent, into the folder `recordings` under the mission's id.
     """
-    folder = recordings if recording is None else recording.parent
-    with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix="oxbow-") as scratch:
-        settings = StackSettings(endpoint=free_endpoint(), home=Path(scratch), recordings=Path(scratch))
+    with scratch_folder() as scratch:
+        settings = StackSettings(endpoint=free_endpoint(), home=scratch, recordings=scratch)
         with running_stack(settings, output=None if DEBUG in os.environ else subprocess.DEVNULL):
             planned = plan_on(job, settings.endpoint).mission
         # The recorder has closed its file by now; where it failed, the plan is worth having all the same.
         assert planned.plan is not None
-        made = Path(scratch) / f"{planned.plan.mission_id}.rrd"
-        if not made.exists():
-            return Planned(planned)
-        return Planned(planned, Path(shutil.move(made, recording or recordings / made.name)))
+        made = scratch / f"{planned.plan.mission_id}.rrd"
+        return Planned(planned, _kept_recording(made, recording or recordings / made.name))
+
+
+def _kept_recording(made: Path, target: Path) -> Path | None:
+    """Where a recording is kept; nowhere, with a warning, where that cannot be: the plan is there already."""
+    if not made.exists():
+        return None
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        move_into_place(made, target)
+    except OSError as error:
+        _log.warning("warning: the recording cannot be kept as %s: %s", target, error.strerror or error)
+        return None
+    return target
 
 
 class _Reported:
@@ -123,11 +140,24 @@ class _Reported:
 
 
 @contextmanager
+def _named_timeout(timeout_s: float) -> Iterator[None]:
+    """Say which option set the time that was too short."""
+    try:
+        yield
+    except DeadlineExceeded as error:
+        raise _too_late(timeout_s) from error
+
+
+def _too_late(timeout_s: float) -> DeadlineExceeded:
+    return DeadlineExceeded(f"no plan within {timeout_s:g} s", where="--timeout")
+
+
+@contextmanager
 def _deadline(timeout_s: float) -> Iterator[None]:
     """Raise `DeadlineExceeded` in the main thread after `timeout_s`."""
 
     def give_up(_number: int, _frame: FrameType | None) -> None:
-        raise DeadlineExceeded(f"no plan within {timeout_s:g} s", where="--timeout")
+        raise _too_late(timeout_s)
 
     signal.signal(signal.SIGALRM, give_up)
     signal.setitimer(signal.ITIMER_REAL, timeout_s)

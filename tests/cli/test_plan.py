@@ -1,6 +1,7 @@
 """`oxbow plan --local`: the command without processes beside it."""
 
 import json
+import os
 
 import pytest
 
@@ -79,7 +80,42 @@ def test_a_recording_is_named_as_the_viewer_needs_it(oxbow, folder):
     assert [path.name for path in folder.iterdir()] == ["pond.json"]
 
 
-def test_no_time_without_end(oxbow):
-    result = oxbow("plan", "pond.json", "--local", "--timeout", "inf")
+@pytest.mark.parametrize("option", ["--timeout", "--time-limit"])
+@pytest.mark.parametrize("seconds", ["inf", "nan", "1e308", "0", "-1", "1e-300", "86401"])
+def test_no_time_without_end_or_beginning(oxbow, option, seconds):
+    result = oxbow("plan", "pond.json", "--local", f"{option}={seconds}")
     assert result.returncode == 2
-    assert "--timeout" in result.stderr
+    assert result.stderr.startswith(f"error: {option}: is ")
+    assert result.stderr.endswith("; expected seconds, 0.001 to 86400\n")
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["-o", "prior.json", "--prior", "prior.json"], "prior.json: is 'prior.json', too"),
+        (["--prior", "link.json", "-o", "prior.json"], "prior.json: is 'link.json', too"),
+        (["-o", "fifo"], "fifo: cannot be written: is not a regular file"),
+        (["-o", "kept.json"], "kept.json: cannot be written: is write-protected"),
+        (["-o", "circle.json"], "circle.json: cannot be written: its symbolic links go round in a circle"),
+        (["-o", "pond.json/planned.json"], "does not exist"),
+        (["-o", "x" * 300], "File name too long"),
+    ],
+)
+def test_what_cannot_be_written_is_told_before_planning(oxbow, folder, options, told):
+    """Planning would end in another error: there is no method of that name."""
+    (folder / "prior.json").write_text('{"type": "FeatureCollection", "features": []}')
+    (folder / "link.json").symlink_to("prior.json")
+    (folder / "kept.json").touch(mode=0o444)
+    (folder / "circle.json").symlink_to("circle.json")
+    os.mkfifo(folder / "fifo")
+    result = oxbow("plan", "pond.json", "--local", "--method", "None", *options)
+    assert result.returncode == 2
+    assert told in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_a_recording_takes_the_place_of_no_other_file(oxbow, folder):
+    (folder / "pond.rrd").write_bytes((folder / "pond.json").read_bytes())
+    result = oxbow("plan", "pond.rrd", "--record", "pond.rrd", "--method", "None")
+    assert result.returncode == 2
+    assert result.stderr.startswith("error: pond.rrd: is 'pond.rrd', too")

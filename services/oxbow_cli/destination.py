@@ -1,0 +1,144 @@
+"""Where a command writes: checked before the work begins, and kept from harm when it is done."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+
+from oxbow.errors import InvalidMission
+from oxbow.files import write_atomically
+
+__all__ = ["Destination", "writing"]
+
+
+@dataclass(frozen=True)
+class Destination:
+    """A file to write, and a digest of what stood there before; None where there was none."""
+
+    path: Path
+    digest: bytes | None
+
+    @classmethod
+    def of(cls, path: Path, *, inputs: Iterable[Path | None] = ()) -> Destination:
+        """A file that can be written, as far as can be told beforehand.
+
+        Parameters
+        ----------
+        inputs
+            Files that the command reads or writes besides, and that must not be overwritten.
+
+        Raises
+        ------
+        InvalidMission
+            It is a folder, no regular file, write-protected or one of the `inputs`, or its folder is missing or
+            cannot be written to.
+        """
+        with writing(path):
+            for other in inputs:
+                if other is not None and _same(path, other):
+                    raise InvalidMission(
+                        f"is {str(other)!r}, too, which is read or written besides; expected another file",
+                        where=str(path),
+                    )
+            _require_place(path)
+            return cls(path, _digest(path))
+
+    def write(self, data: bytes) -> None:
+        """Replace the file as a whole, or leave it as it was."""
+        with writing(self.path):
+            write_atomically(self.path, data)
+
+    def keep(self, data: bytes) -> None:
+        """Write what must not be lost; where that would undo another's change, or fails, beside the file.
+
+        Raises
+        ------
+        InvalidMission
+            It is kept elsewhere; the error tells why, and where.
+        """
+        try:
+            if _digest(self.path) == self.digest:
+                write_atomically(self.path, data)
+                return
+            problem = "was changed meanwhile, and is left as it is"
+        except OSError as error:
+            problem = f"cannot be written: {error.strerror or error}"
+        kept = _kept_elsewhere(self.path, data)
+        where = "could be kept nowhere" if kept is None else f"is kept in {str(kept)!r}"
+        raise InvalidMission(f"{problem}; the plan {where}", where=str(self.path))
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Report a file that cannot be written as a fault of what was asked."""
+    try:
+        yield
+    except OSError as error:
+        raise InvalidMission(f"cannot be written: {error.strerror or error}", where=str(path)) from error
+    except RuntimeError as error:  # as `Path.resolve` has it
+        raise InvalidMission("cannot be written: its symbolic links go round in a circle", str(path)) from error
+
+
+def _same(path: Path, other: Path) -> bool:
+    return path.resolve() == other.resolve() or (path.exists() and other.exists() and path.samefile(other))
+
+
+def _require_place(path: Path) -> None:
+    target = path.resolve()
+    if target.is_dir():
+        raise InvalidMission("cannot be written: is a folder; expected the name of a file", where=str(path))
+    if not target.parent.is_dir():
+        raise InvalidMission(f"cannot be written: the folder {str(path.parent)!r} does not exist", where=str(path))
+    if target.exists():
+        mode = target.stat().st_mode
+        if not stat.S_ISREG(mode):
+            raise InvalidMission("cannot be written: is not a regular file", where=str(path))
+        if not (mode & 0o222 and os.access(target, os.W_OK)):
+            raise InvalidMission("cannot be written: is write-protected", where=str(path))
+    try:
+        with tempfile.TemporaryFile(dir=target.parent):
+            pass
+    except OSError as error:
+        raise InvalidMission(
+            f"cannot be written: the folder {str(path.parent)!r} cannot be written to ({error.strerror})",
+            where=str(path),
+        ) from error
+
+
+def _digest(path: Path) -> bytes | None:
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").digest()
+    except FileNotFoundError:
+        return None
+
+
+def _kept_elsewhere(path: Path, data: bytes) -> Path | None:
+    """Write data to a new file beside another, or among the temporary ones; None where neither can be."""
+    for folder in (path.parent, Path(tempfile.gettempdir())):
+        with suppress(OSError):
+            return _written_anew(folder, path, data)
+    return None
+
+
+def _written_anew(folder: Path, path: Path, data: bytes) -> Path:
+    """A new file, named after another, that holds data; nothing is left of it where it cannot be written."""
+    for number in count(1):
+        kept = folder / f"{path.stem}.planned{'' if number == 1 else f'-{number}'}{path.suffix}"
+        with suppress(FileExistsError):
+            with kept.open("xb"):  # the name is ours now
+                pass
+            break
+    try:
+        write_atomically(kept, data)
+    except OSError:
+        kept.unlink(missing_ok=True)
+        raise
+    return kept
