@@ -38,6 +38,7 @@ from oxbow.errors import Infeasible, renamed
 from oxbow.fleet import Member, TeamPlan, VehiclePlan
 from oxbow.mission import Mission, PlanOptions
 from oxbow.site import Site
+from oxbow.spacing import nominal_spacing_m
 from oxbow.verification import CheckedCall, require_faultless, require_fit_to_follow
 
 __all__ = ["Call", "expected_calls", "plan_mission"]
@@ -209,7 +210,7 @@ def _covered(task: Task, member: Member, approach: Approach, water_m2: float) ->
     """A path over all of a space, with the legs to it."""
     with member.named():
         length_m = approach.length_m(member.vehicle.length_m)
-        decomposition = _decomposed(task, member, approach.space, water_m2 / length_m)
+        decomposition = _decomposed(task, member, approach.space, water_m2, length_m)
         plan = _path(task, member, approach, decomposition, length_m)
         return VehiclePlan(
             member=member,
@@ -222,11 +223,9 @@ def _covered(task: Task, member: Member, approach: Approach, water_m2: float) ->
         )
 
 
-def _decomposed(task: Task, member: Member, space: FreeSpace, spacing_m: float) -> Decomposition:
-    least_m = task.mission.minimal_spatial_rate_m or 0.0
-    request = DecomposeRequest(
-        free=space.free, spacing_m=max(spacing_m, least_m), heading_rad=task.options.heading_rad
-    )
+def _decomposed(task: Task, member: Member, space: FreeSpace, water_m2: float, length_m: float) -> Decomposition:
+    spacing_m = nominal_spacing_m(water_m2, length_m, task.mission.minimal_spatial_rate_m or 0.0)
+    request = DecomposeRequest(free=space.free, spacing_m=spacing_m, heading_rad=task.options.heading_rad)
     return task.call(DECOMPOSE, request, part=task.part(member))
 
 

@@ -17,6 +17,7 @@ from oxbow.fleet import Member, members
 from oxbow.frame import Frame, Position, lonlat
 from oxbow.hot_spots import HotSpots, hot_spots
 from oxbow.mission import Mission, MissionType
+from oxbow.spacing import nominal_spacing_m
 from oxbow.unknown_fields import misspelt
 from oxbow.weights import weighted_areas
 
@@ -43,8 +44,8 @@ class Site:
     area_m2
         Area of the water: the outline less the zones.
     nominal_spacing_m
-        Water area / greatest length of those who survey (Rendas and Li 2016, section 1.2.1.1, step 5), or the
-        mission's least spacing where that is more; the swath where nobody surveys.
+        That of those who survey (`oxbow.spacing`), with the greatest length they may travel; the swath where
+        nobody surveys.
     weighted_areas
         Where sampling is more or less important than elsewhere.
     hot_spots
@@ -188,7 +189,7 @@ def _nominal_spacing_m(mission: Mission, fleet: Sequence[Member], area_m2: float
     if mission.mission_type is MissionType.TREAT:
         return mission.treated_swath_m or least_m
     lengths_m = [member.vehicle.length_m for member in fleet if member.vehicle.role is Role.MASTER]
-    return max(area_m2 / sum(lengths_m), least_m)
+    return nominal_spacing_m(area_m2, sum(lengths_m), least_m)
 
 
 def _idle_warnings(mission: Mission) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.arrays import Geometries, Indices
+from oxbow.arrays import Geometries, Indices, Mask
 from oxbow.contracts import FloatArray
 from oxbow.tolerances import ROUNDING
 
@@ -138,9 +138,9 @@ def _corners(faces: BaseGeometry | Geometries) -> FloatArray:
 def _without_flats(points: FloatArray, triangles: Indices) -> Indices:
     """Triangles without those that have no height, which points in line make.
 
-    A flat triangle's longest side is flipped, the longest of all first: so flips do not undo one another. One with
-    a longest side on the border has no area to lose. A needle, two corners of which are one but for rounding, has
-    two such sides, and none to flip.
+    A flat triangle's longest side is flipped, longer ones before their neighbours: so flips do not undo one
+    another. One with a longest side on the border has no area to lose. A needle, two corners of which are one but
+    for rounding, has two such sides, and none to flip.
     """
     rounding_m = ROUNDING * float(np.abs(points).max(initial=0.0))
     for _ in range(len(triangles)):
@@ -153,9 +153,19 @@ def _without_flats(points: FloatArray, triangles: Indices) -> Indices:
         if lost.any():
             triangles = triangles[~lost]
         elif len(caps):
-            t = caps[np.argmax(longest[caps])]
-            side = 3 * t + np.argmax(lengths[t], keepdims=True)
-            triangles = flipped(triangles, side, twins[side])
+            caps = caps[np.argsort(-longest[caps, 0], kind="stable")]
+            sides = 3 * caps + np.argmax(lengths[caps], axis=1)
+            sides = sides[_first_claims(caps, twins[sides] // 3)]
+            triangles = flipped(triangles, sides, twins[sides])
         else:
             break
     return triangles
+
+
+def _first_claims(triangles: Indices, neighbours: Indices) -> Mask:
+    """Which pairs of a triangle and a neighbour hold neither triangle of an earlier pair."""
+    rank = np.arange(len(triangles))
+    first = np.full(max(triangles.max(), neighbours.max()) + 1, len(rank))
+    np.minimum.at(first, triangles, rank)
+    np.minimum.at(first, neighbours, rank)
+    return np.asarray((first[triangles] == rank) & (first[neighbours] == rank))

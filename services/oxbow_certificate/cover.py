@@ -64,7 +64,8 @@ def cover_radius(
     gap
         The relative gap between the bounds at which the search ends.
     most_squares
-        Squares examined after which the search ends with the bounds it has, wider than `gap`.
+        Squares that may be examined: before there are more, the search ends with the bounds it has, wider than
+        `gap`.
     """
     shapely.prepare(region)
     place, low_m = _farthest(shapely.get_coordinates(region), distance)
@@ -83,7 +84,7 @@ def cover_radius(
         squares = squares.where(alive).meeting(region)
         if not len(squares):
             return CoverRadius(low_m, low_m * (1 + gap), place)
-        if examined > most_squares:
+        if examined + 4 * len(squares) > most_squares:
             return CoverRadius(low_m, high_m, place)
         squares = squares.quarters()
 

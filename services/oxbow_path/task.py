@@ -10,12 +10,13 @@ from typing import Protocol
 
 import numpy as np
 import shapely
-from shapely import LineString
+from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray, FreeSpace, PathRequest, SpacingStep, WeightedArea
 from oxbow.recording import Layer, LayerKind, Show
 from oxbow.route.gate_routes import Routes
+from oxbow.spacing import nominal_spacing_m
 from oxbow.sweep import from_sweep, to_sweep
 from oxbow_path.refinement import RefinementStep, Samples
 from oxbow_path.walk.legs import Passable, access
@@ -33,6 +34,9 @@ STAGE = "path"
 FINEST = 200
 """At most so many spacings make up the root of the water's area."""
 
+FINEST_ALONG = 20_000
+"""At most so many spacings make up the length of the shore: of canals, more than of the root of the area."""
+
 PROBE_PITCH = 0.35
 """Pitch of the probe grid, in nominal spacings."""
 
@@ -42,8 +46,14 @@ SAMPLE_PITCH = 0.215
 SHOWN_EVERY = 10
 """The path of every so manieth step of an improvement is shown."""
 
+FINEST_M = 0.1
+"""No less spacing is planned, however small the water: vehicles are not narrower."""
+
+GATES_ALONG = 15_000
+"""Routes pass the water through about so many gates at most."""
+
 MOST_SAMPLES = 250_000
-"""Of more samples than about these, the pitch is widened."""
+"""Of more samples, or places of the probe, than about these, the pitch is widened."""
 
 
 @dataclass(frozen=True)
@@ -77,13 +87,13 @@ class Task:
             No water leads from the launch or the recovery point to the free space.
         """
         least_spacing_m = max(request.min_spacing_m, finest_spacing_m(request.space))
-        nominal_m = max(request.space.free.area / request.length_m, least_spacing_m)
+        nominal_m = nominal_spacing_m(request.space.free.area, request.length_m, least_spacing_m)
         waters = prepared_waters(request, nominal_m)
         return cls(request, waters, Budget(request.length_m, least_spacing_m), stop)
 
     @property
     def spacing_m(self) -> float:
-        """The nominal spacing: area / length, or the least that is wanted."""
+        """The nominal spacing (`oxbow.spacing`)."""
         return self.waters.spacing_m
 
     @property
@@ -103,8 +113,9 @@ class Task:
     @cached_property
     def samples(self) -> Samples:
         """The places that the path is to come near to."""
-        least_m = math.sqrt(self.waters.free.area / MOST_SAMPLES)
-        return Samples.over(self.waters.free, max(SAMPLE_PITCH * self.spacing_m, least_m), self.areas)
+        return Samples.over(
+            self.waters.free, _pitch_m(self.waters.free, SAMPLE_PITCH * self.spacing_m), self.areas
+        )
 
 
 @dataclass(frozen=True)
@@ -170,7 +181,12 @@ def finest_spacing_m(space: FreeSpace) -> float:
 
     Rendas and Li 2016, section 1.2.1.2, find that the spacing needs a least value for small sites.
     """
-    return math.sqrt(space.free.area) / FINEST
+    return max(FINEST_M, math.sqrt(space.free.area) / FINEST, space.free.length / FINEST_ALONG)
+
+
+def _pitch_m(free: Polygon, wanted_m: float) -> float:
+    """The pitch of places over the free space, widened where there would be too many."""
+    return max(wanted_m, math.sqrt(free.area / MOST_SAMPLES))
 
 
 def prepared_waters(request: PathRequest, spacing_m: float) -> Waters:
@@ -185,8 +201,8 @@ def prepared_waters(request: PathRequest, spacing_m: float) -> Waters:
         cells=request.decomposition.cells,
         free=free,
         passable=Passable(free),
-        probe=Probe.over(free, PROBE_PITCH * spacing_m),
-        routes=Routes(free, PROBE_PITCH * spacing_m),
+        probe=Probe.over(free, _pitch_m(free, PROBE_PITCH * spacing_m)),
+        routes=Routes(free, max(PROBE_PITCH * spacing_m, free.length / GATES_ALONG)),
         launch=access(tuple(launch), free, shore, where="LaunchPoint"),
         recovery=access(tuple(recovery), free, shore, where="RecoveryPoint"),
     )

@@ -10,6 +10,7 @@ from shapely import Polygon
 
 from oxbow.contracts import FloatArray
 from oxbow.errors import InvalidMission
+from oxbow.lattice import lattice_within
 from oxbow.mesh.mesh import Mesh
 from oxbow.mesh.refinement import refined
 from oxbow.mesh.relaxation import relaxed
@@ -91,15 +92,9 @@ def _lattice(area: Polygon, border: Polygon, pitch_m: float) -> FloatArray:
     longest = int(np.argmax(np.hypot(*steps.T)))
     turn = np.arctan2(steps[longest, 1], steps[longest, 0])
     along = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
-    low, high = ((ring - ring[longest]) @ along.T).min(axis=0), ((ring - ring[longest]) @ along.T).max(axis=0)
-    row_m = pitch_m * math.sqrt(3) / 2
-    row, column = np.meshgrid(
-        np.arange(math.floor(low[1] / row_m), math.ceil(high[1] / row_m) + 1),
-        np.arange(math.floor(low[0] / pitch_m) - 1, math.ceil(high[0] / pitch_m) + 1),
-        indexing="ij",
-    )
-    places = np.column_stack([((column + row % 2 / 2) * pitch_m).ravel(), (row * row_m).ravel()])
+    upright = shapely.transform(area, lambda xy: (xy - ring[longest]) @ along.T)
+    row_m = pitch_m * math.sqrt(0.75)
+    places = lattice_within(upright, (0.0, 0.0), pitch_m, row_m, shift_m=pitch_m / 2)
     places = places @ along + ring[longest]
-    places = places[shapely.contains_xy(area, *places.T)]
     far = shapely.distance(shapely.points(places), border.boundary) > FROM_BORDER * pitch_m
     return np.asarray(places[far])

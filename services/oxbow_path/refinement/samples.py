@@ -12,6 +12,7 @@ import shapely
 from shapely import Polygon, STRtree
 
 from oxbow.contracts import FloatArray, WeightedArea
+from oxbow.lattice import lattice_within
 
 __all__ = ["Samples", "weights_at"]
 
@@ -53,18 +54,14 @@ class Samples:
 def _lattice(free: Polygon, pitch_m: float) -> FloatArray:
     """The points of a hexagonal lattice inside a polygon."""
     x0, y0, x1, y1 = free.bounds
-    radius_m = math.hypot(x1 - x0, y1 - y0) / 2
-    rows = np.arange(-radius_m, radius_m, pitch_m * math.sqrt(3) / 2)
-    columns = np.arange(-radius_m, radius_m, pitch_m)
-    along = columns[None, :] + np.where(np.arange(len(rows)) % 2, pitch_m / 2, 0.0)[:, None]
-    across = np.broadcast_to(rows[:, None], along.shape)
+    middle, radius_m = np.array([x0 + x1, y0 + y1]) / 2, math.hypot(x1 - x0, y1 - y0) / 2
     cos, sin = math.cos(TILT_RAD), math.sin(TILT_RAD)
-    x = (x0 + x1) / 2 + cos * along - sin * across
-    y = (y0 + y1) / 2 + sin * along + cos * across
-    near = (x0 <= x) & (x <= x1) & (y0 <= y) & (y <= y1)
-    points = np.column_stack([x[near], y[near]])
-    shapely.prepare(free)
-    return np.asarray(points[shapely.contains_xy(free, points[:, 0], points[:, 1])])
+    turn = np.array([[cos, sin], [-sin, cos]])
+    upright = shapely.transform(free, lambda xy: (xy - middle) @ turn.T)
+    places = lattice_within(
+        upright, (-radius_m, -radius_m), pitch_m, pitch_m * math.sqrt(0.75), shift_m=pitch_m / 2
+    )
+    return np.asarray(places @ turn + middle)
 
 
 def weights_at(points: FloatArray, areas: Sequence[WeightedArea]) -> FloatArray:

@@ -50,7 +50,9 @@ def enclosed(way: FloatArray, free: Polygon, lane_m: float) -> Polygon:
     stretches = shapely.get_parts(shapely.union_all([LineString(way)], grid_size=GRID_M))
     faces = shapely.get_parts(shapely.polygonize(stretches))
     region = shapely.union_all([Polygon(), *faces[_is_odd(faces, way)]])
-    twice = stretches[~shapely.covers(region.boundary, stretches)]
+    boundary = region.boundary
+    shapely.prepare([region, boundary])
+    twice = stretches[~shapely.covers(boundary, stretches)]
     inside = shapely.covers(region, twice)
     added = shapely.buffer([*twice[~inside], *_meetings(stretches)], lane_m, quad_segs=QUAD_SEGS)
     region = largest(region.union(shapely.union_all(added).intersection(free)))
@@ -71,12 +73,14 @@ def _moats(region: Polygon, free: Polygon, width_m: float) -> BaseGeometry:
 
 
 def _slit(region: Polygon, slits: Geometries) -> Polygon:
-    """The region less all slits that do not part it."""
-    for slit in slits:
-        rest = region.difference(slit)
-        if isinstance(rest, Polygon) and not rest.is_empty:
-            region = rest
-    return region
+    """The region less the slits that do not part it: all together, or else one half of them after the other."""
+    if len(slits) == 0:
+        return region
+    rest = region.difference(shapely.union_all(slits))
+    if isinstance(rest, Polygon) and not rest.is_empty:
+        return rest
+    half = len(slits) // 2
+    return region if half == 0 else _slit(_slit(region, slits[:half]), slits[half:])
 
 
 def _is_odd(faces: Geometries, way: FloatArray) -> Mask:

@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
+from oxbow.lattice import lattice_within
 
 __all__ = ["Probe", "covered"]
 
@@ -31,11 +32,9 @@ class Probe:
 
     @classmethod
     def over(cls, free: Polygon, pitch_m: float) -> Probe:
-        """Cover `free` (prepared or not) by a grid, and its shore by points as dense."""
-        x0, y0, x1, y1 = free.bounds
-        grid = np.meshgrid(np.arange(x0 + pitch_m / 2, x1, pitch_m), np.arange(y0 + pitch_m / 2, y1, pitch_m))
-        xy = np.column_stack([axis.ravel() for axis in grid])
-        inside = xy[shapely.contains_xy(free, xy[:, 0], xy[:, 1])]
+        """Cover `free` by a grid, and its shore by points as dense."""
+        x0, y0, *_ = free.bounds
+        inside = lattice_within(free, (x0 + pitch_m / 2, y0 + pitch_m / 2), pitch_m, pitch_m)
         shore = shapely.get_coordinates(shapely.segmentize(free.boundary, pitch_m))
         return cls(np.vstack([inside, shore]), pitch_m)
 
