@@ -85,6 +85,8 @@ Oxbow's processes meet on [Zenoh](https://zenoh.io) 1.x, each in `client` mode a
 - Ids are 1 to {MOST_ID_CHARACTERS} of `A-Z a-z 0-9 _ . -`, the first of them not `.`.
 - No request is larger than {MAX_REQUEST_BYTES // 2**20} MiB.
 - An error is an error reply with an `ErrorReply` in JSON; any other encoding marks an error of Zenoh's own.
+- Publications are heard at most once, and anyone may put: follow a plan only as the history has it, and ask for
+  what is new there after each publication, each loss of the link, and now and then, as `oxbow.Client` does.
 - A query that has no reply at all was lost: ask again. Requests may be repeated under one `request_id`.
 - A stage with several replicas has a key for each. The caller chooses one that is alive, the one with the fewest
   of its requests, and asks another where the first is busy or lost. `oxbow.bus.Bus.call` does all of this.
@@ -127,11 +129,19 @@ def _keys() -> str:
         (_mission("request"), "put or query, JSON Mission File", "DSS → mission"),
         (_mission("status"), "publication and query, `MissionStatus`", "mission → DSS"),
         (_mission("plan"), "publication and query of the latest: the completed Mission File", "mission → DSS"),
-        (str(MissionKey("{id}", "plan", "{revision}")), "query: a plan of the history", "DSS → mission"),
+        (
+            str(MissionKey("{id}", "plan", "{revision}")),
+            "query: a plan of the history, or `*?after=3`: those of later revisions",
+            "DSS → mission",
+        ),
         (_mission("cancel"), "put or query, empty; replies `MissionStatus`", "DSS → mission"),
         (_mission("report"), "put, JSON: vehicle state, track, obstacles, blooms found", "guidance → mission"),
         (_mission("replan"), "publication and query of the latest, as `plan`", "mission → guidance"),
-        (str(MissionKey("{id}", "replan", "{revision}")), "query: a replan of the history", "guidance → mission"),
+        (
+            str(MissionKey("{id}", "replan", "{revision}")),
+            "query: a replan of the history, as `plan`",
+            "guidance → mission",
+        ),
         (PLAN_KEY, "query: Mission File in, completed Mission File out", "DSS → mission"),
         (_stage(), "query with an `Envelope` attached", "mission → stages"),
         *((f"{_stage()}/@{what}", "query, JSON", "operators → stages") for what in INTROSPECTION),

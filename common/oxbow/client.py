@@ -8,17 +8,15 @@
 
 from __future__ import annotations
 
-import queue
+import logging
 import time
-from collections.abc import Callable, Iterator
+import uuid
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict, TypeVar, Unpack
 
-import msgspec
-
-from oxbow.bus import DEFAULT_ENDPOINT, Bus
+from oxbow.bus import DEFAULT_ENDPOINT, Bus, Subscription
 from oxbow.closing import Closing
 from oxbow.contracts import (
     ANY,
@@ -29,19 +27,23 @@ from oxbow.contracts import (
     MissionKey,
     MissionStatus,
     checked_id,
+    live_key,
     mission_key,
 )
-from oxbow.errors import Busy, InvalidMission, Unavailable
+from oxbow.errors import Busy, Internal, InvalidMission, Unavailable
+from oxbow.ids import excerpt
 from oxbow.mission import Mission, parse_mission, read_mission
 from oxbow.submission import Submission, SubmissionParameters
+from oxbow.updates import ANSWER_S, PlanUpdate, PlanUpdates, kept_plan, read_status
+from oxbow.waits import checked_wait
 
 __all__ = ["Client", "Options", "PlanUpdate", "PlanUpdates"]
 
 R = TypeVar("R")
 
-ANSWER_S = 30.0
-"""How long the mission service may take to answer what needs no planning."""
 RETRY_PAUSE_S = 0.2
+
+_log = logging.getLogger(__name__)
 
 
 class Options(TypedDict, total=False):
@@ -56,53 +58,6 @@ class Options(TypedDict, total=False):
     draw: Draw
 
 
-@dataclass(frozen=True)
-class PlanUpdate:
-    """A new plan: the completed mission, and the revision of the mission that it plans."""
-
-    mission_id: str
-    revision: int
-    mission: Mission
-
-
-class PlanUpdates(Closing, Iterator[PlanUpdate]):
-    """Plans as they are made, each once, those of one mission by rising revision; blocks while there is none.
-
-    Iteration ends when it is closed, by whichever thread, or after `timeout_s` without an update.
-    """
-
-    def __init__(self, bus: Bus, key: MissionKey, kept: Iterator[PlanUpdate], timeout_s: float | None) -> None:
-        self.timeout_s = timeout_s
-        self._kept: Iterator[PlanUpdate] = kept
-        self._live: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
-        self._seen: dict[str, int] = {}
-        # Before what is kept is asked for, so that nothing is missed between the two.
-        self._subscription = bus.subscribe(str(key), lambda _key, payload: self._live.put(payload))
-
-    def __next__(self) -> PlanUpdate:
-        while True:
-            update = next(self._kept, None) or self._next_live()
-            if update.revision > self._seen.get(update.mission_id, 0):
-                self._seen[update.mission_id] = update.revision
-                return update
-
-    def _next_live(self) -> PlanUpdate:
-        try:
-            payload = self._live.get(timeout=self.timeout_s)
-        except queue.Empty:
-            payload = None
-        if payload is None:
-            self.close()
-            raise StopIteration
-        return _plan_update(payload)
-
-    def close(self) -> None:
-        """Receive nothing more, and end the iteration."""
-        self._kept = iter(())
-        self._subscription.close()
-        self._live.put(None)
-
-
 class Client(Closing):
     """Hands missions to Oxbow and receives plans; a context manager, safe to share between threads.
 
@@ -113,6 +68,11 @@ class Client(Closing):
     timeout_s
         How long to wait for the router and the mission service.
 
+    Attributes
+    ----------
+    client_id
+        The name under which the service tells this client from others, with which it takes turns.
+
     Raises
     ------
     Unavailable
@@ -120,10 +80,13 @@ class Client(Closing):
     """
 
     def __init__(self, endpoint: str = DEFAULT_ENDPOINT, *, timeout_s: float = 10.0) -> None:
-        give_up = time.monotonic() + timeout_s
+        give_up = time.monotonic() + checked_wait(timeout_s, "timeout_s")
+        self.client_id = uuid.uuid4().hex
         with ExitStack() as stack:
             self._bus = stack.enter_context(Bus.connect(endpoint, timeout_s=timeout_s))
             self._bus.wait_ready(["mission"], max(0.0, give_up - time.monotonic()))
+            # While it is there, the service waits for answers with this client.
+            self._bus.declare_live(live_key("client", self.client_id))
             self._stack = stack.pop_all()
 
     def close(self) -> None:
@@ -166,16 +129,18 @@ class Client(Closing):
             What is wrong with the mission.
         DeadlineExceeded
             There is no plan after `timeout_s`.
-        Unavailable, Busy, Internal
+        Cancelled
+            Someone cancelled it.
+        Unavailable, Busy
             It cannot be planned now.
+        Internal
+            A fault of Oxbow, or an answer that is not of this mission, which is never returned.
         """
-        submission = _submission(mission, mission_id, timeout_s, options)
+        submission = self._submission(mission, mission_id, timeout_s, options)
         with ExitStack() as stack:
             if on_status is not None:
-                key = mission_key(submission.mission_id, "status")
-                subscription = self._bus.subscribe(key, lambda _key, payload: on_status(_status(payload)))
-                stack.callback(subscription.close)
-            return parse_mission(self._ask(PLAN_KEY, submission, timeout_s))
+                stack.callback(self._hear_statuses(submission.mission_id, on_status).close)
+            return _own_plan(self._ask(PLAN_KEY, submission, timeout_s)[0][1], submission)
 
     def submit(
         self,
@@ -206,12 +171,28 @@ class Client(Closing):
         Unavailable, Busy, DeadlineExceeded
             The service did not answer.
         """
-        submission = _submission(mission, mission_id, deadline_s, options)
-        return _status(self._ask(mission_key(submission.mission_id, "request"), submission, ANSWER_S))
+        submission = self._submission(mission, mission_id, deadline_s, options)
+        replies = self._ask(mission_key(submission.mission_id, "request"), submission, ANSWER_S)
+        return _own_status(replies, submission.mission_id)
+
+    def cancel(self, mission_id: str) -> MissionStatus:
+        """End whatever of a mission waits or is being planned, which then has `failed`, `cancelled`.
+
+        Returns
+        -------
+        MissionStatus
+            Of the latest revision; one that was done before stays so.
+
+        Raises
+        ------
+        InvalidMission
+            There is no such mission.
+        """
+        return _own_status(self._ask_kept(mission_key(mission_id, "cancel")), mission_id)
 
     def status(self, mission_id: str) -> MissionStatus:
         """Where the latest revision of a mission stands; `InvalidMission` where there is no such mission."""
-        return _status(self._ask_kept(mission_key(mission_id, "status"))[0][1])
+        return _own_status(self._ask_kept(mission_key(mission_id, "status")), mission_id)
 
     def statuses(self) -> list[MissionStatus]:
         """Where the latest revision of each mission stands, oldest mission first."""
@@ -219,7 +200,7 @@ class Client(Closing):
             replies = self._ask_kept(str(MissionKey(ANY, "status")))
         except InvalidMission:
             return []
-        return [_status(payload) for _key, payload in replies]
+        return list(_readable_statuses(replies))
 
     def plans(
         self, mission_id: str | None = None, *, history: bool = True, timeout_s: float | None = None
@@ -243,30 +224,35 @@ class Client(Closing):
 
     def _updates(self, what: str, mission_id: str | None, history: bool, timeout_s: float | None) -> PlanUpdates:
         key = MissionKey(ANY if mission_id is None else checked_id(mission_id), what)
-        updates = PlanUpdates(self._bus, key, self._kept(key) if history else iter(()), timeout_s)
+        updates = PlanUpdates(self._bus, key, history=history, timeout_s=timeout_s)
         self._stack.callback(updates.close)
         return updates
-
-    def _kept(self, key: MissionKey) -> Iterator[PlanUpdate]:
-        """The plans in the service's store, asked for mission by mission."""
-        every = key.mission_id == ANY
-        mission_ids = [status.mission_id for status in self.statuses()] if every else [key.mission_id]
-        for mission_id in mission_ids:
-            try:
-                replies = self._ask_kept(str(MissionKey(mission_id, key.what, ANY)))
-            except InvalidMission:  # nothing is kept of it
-                continue
-            updates = [_plan_update(payload) for _key, payload in replies]
-            yield from sorted(updates, key=lambda update: update.revision)
 
     def _ask_kept(self, key: str) -> list[tuple[str, bytes]]:
         return self._retry(lambda remaining_s: self._bus.query(key, timeout_s=remaining_s), ANSWER_S)
 
-    def _ask(self, key: str, submission: Submission, timeout_s: float) -> bytes:
+    def _submission(
+        self, mission: Mission | bytes | Path | str, mission_id: str | None, deadline_s: float, options: Options
+    ) -> Submission:
+        if isinstance(mission, bytes):
+            mission = parse_mission(mission)
+        elif isinstance(mission, Path | str):
+            mission = read_mission(mission)
+        parameters = SubmissionParameters(id=mission_id, deadline_s=deadline_s, client=self.client_id, **options)
+        return Submission(mission, parameters)
+
+    def _hear_statuses(self, mission_id: str, on_status: Callable[[MissionStatus], None]) -> Subscription:
+        def hear(key: str, payload: bytes) -> None:
+            for status in _readable_statuses([(key, payload)], mission_id):
+                on_status(status)
+
+        return self._bus.subscribe(mission_key(mission_id, "status"), hear)
+
+    def _ask(self, key: str, submission: Submission, timeout_s: float) -> list[tuple[str, bytes]]:
         selector = f"{key}?{submission.parameters_text}"
         document = submission.document
         return self._retry(
-            lambda remaining_s: self._bus.query(selector, document, timeout_s=remaining_s)[0][1], timeout_s
+            lambda remaining_s: self._bus.query(selector, document, timeout_s=remaining_s), timeout_s
         )
 
     def _retry(self, ask: Callable[[float], R], timeout_s: float) -> R:
@@ -281,24 +267,37 @@ class Client(Closing):
             time.sleep(RETRY_PAUSE_S)
 
 
-def _submission(
-    mission: Mission | bytes | Path | str, mission_id: str | None, deadline_s: float, options: Options
-) -> Submission:
-    if isinstance(mission, bytes):
-        mission = parse_mission(mission)
-    elif isinstance(mission, Path | str):
-        mission = read_mission(mission)
-    return Submission(mission, SubmissionParameters(id=mission_id, deadline_s=deadline_s, **options))
+def _readable_statuses(
+    samples: Iterable[tuple[str, bytes]], mission_id: str | None = None
+) -> Iterator[MissionStatus]:
+    """Statuses, of one mission where given; what is none is logged and passed over."""
+    for key, payload in samples:
+        try:
+            yield read_status(payload, mission_id)
+        except InvalidMission as error:
+            _log.warning("%s: passed over: %s", excerpt(key), error)
 
 
-def _status(payload: bytes) -> MissionStatus:
-    return msgspec.json.decode(payload, type=MissionStatus)
+def _own_status(replies: list[tuple[str, bytes]], mission_id: str) -> MissionStatus:
+    """The status of the mission that was asked for, and of no other."""
+    try:
+        return read_status(replies[0][1], mission_id)
+    except InvalidMission as error:
+        raise Internal(
+            f"the mission service answered for another: {error}", where=f"mission {mission_id}"
+        ) from error
 
 
-def _plan_update(payload: bytes) -> PlanUpdate:
-    mission = parse_mission(payload)
-    if mission.plan is None or mission.plan.mission_id is None or mission.plan.revision is None:
-        raise InvalidMission(
-            "has no mission_id and revision; expected what the mission service plans", where="Plan"
-        )
-    return PlanUpdate(mission.plan.mission_id, mission.plan.revision, mission)
+def _own_plan(payload: bytes, submission: Submission) -> Mission:
+    """The plan of the mission that was handed in, and of no other."""
+    where = f"mission {submission.mission_id}"
+    try:
+        update = kept_plan(payload)
+    except InvalidMission as error:
+        raise Internal(f"the mission service answered what is no plan: {error}", where=where) from error
+    if update.mission_id != submission.mission_id or update.revision < 1:
+        other = f"{excerpt(update.mission_id)}, revision {update.revision}"
+        raise Internal(f"the mission service answered by the plan of mission {other}", where=where)
+    if Submission(update.mission).document != submission.document:
+        raise Internal("the mission service answered by a plan of other content", where=where)
+    return update.mission

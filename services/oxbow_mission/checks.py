@@ -59,11 +59,13 @@ class Checks(Closing):
     ----------
     memory_mb
         What a helper process may take.
+    handler
+        What the helper processes do, as ``package.module:attribute``.
     """
 
-    def __init__(self, memory_mb: int) -> None:
-        self._slow = _Lane("slow", memory_mb, SLOW_S, _refuse_late)
-        self._quick = _Lane("quick", memory_mb, QUICK_S, self._slow.put)
+    def __init__(self, memory_mb: int, handler: str = "oxbow_mission.check:check") -> None:
+        self._slow = _Lane(Helpers(handler, memory_mb), SLOW_S, _refuse_late)
+        self._quick = _Lane(Helpers(handler, memory_mb), QUICK_S, self._slow.put)
         self._quick.prepare()
 
     def put(self, incoming: Incoming) -> None:
@@ -83,17 +85,16 @@ class Checks(Closing):
 
 
 class _Lane:
-    """Threads with a helper process each."""
+    """Threads with a helper process each, and what to do with a request that takes longer than `limit_s`."""
 
-    def __init__(self, name: str, memory_mb: int, limit_s: float, on_late: Callable[[Incoming], None]) -> None:
-        self.name = name
+    def __init__(self, helpers: Helpers, limit_s: float, on_late: Callable[[Incoming], None]) -> None:
         self.limit_s = limit_s
         self._on_late = on_late
         self._queue = FairQueue[Incoming](most_items=MOST_ITEMS, most_bytes=MOST_BYTES)
-        self._helpers = Helpers("oxbow_mission.check:check", memory_mb)
+        self._helpers = helpers
         # Daemons: what is being checked must not keep this process from ending.
         self._threads = [
-            threading.Thread(target=self._work, name=f"{name}-{i}", daemon=True) for i in range(PROCESSES)
+            threading.Thread(target=self._work, name=f"check-{i}", daemon=True) for i in range(PROCESSES)
         ]
         for thread in self._threads:
             thread.start()
@@ -123,7 +124,7 @@ class _Lane:
                 with self._helpers.one() as helper:
                     self._deal(incoming, helper)
             except BaseException:  # noqa: BLE001 - zenoh's panics are no Exception; the thread lives on
-                _log.exception("%s lane: a request was lost", self.name)
+                _log.exception("a request was lost")
 
     def _deal(self, incoming: Incoming, helper: Helper) -> None:
         try:

@@ -7,6 +7,7 @@ import threading
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from oxbow.errors import Busy
@@ -38,58 +39,73 @@ class Order:
             self._served.pop(next(iter(self._served)))
 
 
+@dataclass
+class _Row(Generic[T]):
+    """What one client has waiting."""
+
+    items: deque[tuple[T, int]] = field(default_factory=deque)
+    size: int = 0
+
+
 class FairQueue(Generic[T]):
     """Items of clients, to be taken in turn.
 
     Parameters
     ----------
-    most_items, most_bytes
-        What one client may have waiting, and what all of them may.
+    most_items
+        What one client may have waiting.
+    most_bytes
+        What all of them may have waiting, and one of them half of. An item that is larger waits alone.
     """
 
     def __init__(self, *, most_items: int, most_bytes: int) -> None:
         self.most_items = most_items
         self.most_bytes = most_bytes
         self._changed = threading.Condition()
-        self._items: defaultdict[str, deque[tuple[T, int]]] = defaultdict(deque)
-        self._bytes = 0
+        self._rows: dict[str, _Row[T]] = {}
         self._order = Order()
         self._closed = False
 
     def put(self, client: str, item: T, size: int) -> None:
         """Add an item of so many bytes; `Busy` where there is no room for it."""
         with self._changed:
-            waiting = len(self._items[client]) if client in self._items else 0
-            if waiting >= self.most_items or (self._bytes and self._bytes + size > self.most_bytes):
-                raise Busy(
-                    f"{waiting} requests of this client and {self._bytes} bytes wait to be read; expected at most"
-                    f" {self.most_items} and {self.most_bytes}: try again later",
-                    where="mission",
-                )
-            self._items[client].append((item, size))
-            self._bytes += size
+            row = self._rows.get(client, _Row())
+            self._require_room(row, size)
+            row.items.append((item, size))
+            row.size += size
+            self._rows[client] = row
             self._changed.notify()
+
+    def _require_room(self, row: _Row[T], size: int) -> None:
+        every = sum(each.size for each in self._rows.values())
+        is_room = not every or every + size <= self.most_bytes
+        is_own_room = not row.size or row.size + size <= self.most_bytes // 2
+        if len(row.items) >= self.most_items or not (is_room and is_own_room):
+            raise Busy(
+                f"{len(row.items)} requests and {row.size} bytes of this client, {every} bytes in all wait to be"
+                f" read; expected at most {self.most_items}, {self.most_bytes // 2} and {self.most_bytes}",
+                where="mission",
+            )
 
     def get(self) -> T | None:
         """Wait for the next item; None once the queue is closed."""
         with self._changed:
-            self._changed.wait_for(lambda: self._closed or self._items)
+            self._changed.wait_for(lambda: self._closed or self._rows)
             if self._closed:
                 return None
-            client = self._order.next(self._items)
+            client = self._order.next(self._rows)
             self._order.note(client)
-            item, size = self._items[client].popleft()
-            if not self._items[client]:
-                del self._items[client]
-            self._bytes -= size
+            row = self._rows[client]
+            item, size = row.items.popleft()
+            row.size -= size
+            if not row.items:
+                del self._rows[client]
             return item
 
     def drop(self, client: str) -> list[T]:
         """Take out all items of a client."""
         with self._changed:
-            dropped = self._items.pop(client, deque())
-            self._bytes -= sum(size for _, size in dropped)
-            return [item for item, _ in dropped]
+            return [item for item, _ in self._rows.pop(client, _Row()).items]
 
     def close(self) -> None:
         """Give out no more."""

@@ -18,7 +18,22 @@ from oxbow.closing import Closing
 from oxbow.errors import DeadlineExceeded, Internal, OxbowError
 from oxbow.stage.watch import Verdict, Watch
 from oxbow.stage.worker import ended, is_want_of_memory, needs_memory, one_threaded
-from oxbow_mission.wire import STAGE, Answer, Ask, Check, Checked, Failed, FromHelper, Plan, Planned, Ready, Show
+from oxbow_mission.wire import (
+    STAGE,
+    Answer,
+    Ask,
+    Check,
+    Checked,
+    Failed,
+    FromHelper,
+    Plan,
+    Planned,
+    Ready,
+    Said,
+    Show,
+    ToHelper,
+    Told,
+)
 
 __all__ = ["Helper", "HelperDied", "Helpers"]
 
@@ -62,7 +77,7 @@ class Helper(Closing):
         self.handler = handler
         self.memory_mb = memory_mb
         self._lock = threading.Lock()
-        self._is_up = False
+        self._is_up, self._order = False, 0
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe: Connection | None = None
 
@@ -115,25 +130,37 @@ class Helper(Closing):
 
     def _greet(self) -> None:
         """Wait until the process has loaded what it needs: that is no part of an order's time."""
-        assert self._pipe is not None
-        said = _decoded(self._pipe.recv_bytes(MOST_MESSAGE_BYTES))
-        if not isinstance(said, Ready):
-            raise HelperDied(f"a helper process began with {type(said).__name__}", is_own_fault=True)
+        if not isinstance(self._heard(), Ready):
+            raise HelperDied("a helper process said something before it was ready", is_own_fault=False)
         self._is_up = True
 
     def _converse(self, order: Check | Plan, answer: Callable[[Ask | Show], Answer | None]) -> Outcome:
-        pipe = self._pipe
-        assert pipe is not None
-        message: Check | Plan | Answer | None = order
-        while True:
-            if message is not None:
-                pipe.send_bytes(msgspec.msgpack.encode(message))
-            said = _decoded(pipe.recv_bytes(MOST_MESSAGE_BYTES))
-            if isinstance(said, Ready):
-                raise HelperDied("a helper process began anew", is_own_fault=True)
-            if not isinstance(said, Ask | Show):
-                return said
-            message = answer(said)
+        self._order += 1
+        self._tell(order)
+        while isinstance(said := self._heard(), Ask | Show):
+            reply = answer(said)
+            if reply is not None:
+                self._tell(reply)
+        if isinstance(said, Ready):
+            raise HelperDied("a helper process began anew", is_own_fault=False)
+        return said
+
+    def _tell(self, message: ToHelper) -> None:
+        assert self._pipe is not None
+        self._pipe.send_bytes(msgspec.msgpack.encode(Told(order=self._order, what=message)))
+
+    def _heard(self) -> FromHelper:
+        assert self._pipe is not None
+        data = self._pipe.recv_bytes(MOST_MESSAGE_BYTES)
+        try:
+            said = msgspec.msgpack.decode(data, type=Said)
+        except (msgspec.MsgspecError, ValueError) as error:
+            raise HelperDied(f"a helper process sent garbage: {error}", is_own_fault=True) from error
+        if said.order != self._order:
+            raise HelperDied(
+                f"a helper process answered order {said.order}, not {self._order}", is_own_fault=False
+            )
+        return said.what
 
     def kill(self) -> None:
         """End the process at once; the next order starts another."""
@@ -147,7 +174,7 @@ class Helper(Closing):
             if self._is_ready():
                 return
             self._release()
-            self._is_up = False
+            self._is_up, self._order = False, 0
             self._pipe, theirs = Pipe()
             with theirs:
                 fd = theirs.fileno()
@@ -230,11 +257,3 @@ class Helpers(Closing):
         with self._lock:
             for helper in self._idle:
                 helper.close()
-
-
-def _decoded(data: bytes) -> FromHelper:
-    try:
-        message: FromHelper = msgspec.msgpack.decode(data, type=FromHelper)
-    except (msgspec.MsgspecError, ValueError) as error:
-        raise HelperDied(f"a helper process sent garbage: {error}", is_own_fault=True) from error
-    return message

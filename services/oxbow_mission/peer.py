@@ -7,7 +7,7 @@ from multiprocessing.connection import Connection
 
 import msgspec
 
-from oxbow_mission.wire import Answer, Ask, FromHelper, ToHelper
+from oxbow_mission.wire import Answer, Ask, FromHelper, Said, ToHelper, Told
 
 __all__ = ["Handler", "HungUp", "Peer"]
 
@@ -21,11 +21,12 @@ class Peer:
 
     def __init__(self, pipe: Connection) -> None:
         self._pipe = pipe
+        self._order = 0
 
     def send(self, message: FromHelper) -> None:
         """Say something."""
         try:
-            self._pipe.send_bytes(msgspec.msgpack.encode(message))
+            self._pipe.send_bytes(msgspec.msgpack.encode(Said(order=self._order, what=message)))
         except OSError as error:
             raise HungUp from error
 
@@ -35,8 +36,9 @@ class Peer:
             data = self._pipe.recv_bytes()
         except (EOFError, OSError) as error:
             raise HungUp from error
-        message: ToHelper = msgspec.msgpack.decode(data, type=ToHelper)
-        return message
+        told = msgspec.msgpack.decode(data, type=Told)
+        self._order = told.order
+        return told.what
 
     def ask(self, ask: Ask) -> Answer:
         """Ask a stage, by way of the mission service, which has the bus."""

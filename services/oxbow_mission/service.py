@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 import threading
 from collections.abc import Callable, Iterator, Sized
 
@@ -23,6 +24,7 @@ from oxbow.contracts import (
     mission_key,
 )
 from oxbow.errors import ErrorReply, Internal, InvalidMission, OxbowError, described
+from oxbow.ids import excerpt
 from oxbow_mission.checks import Checks
 from oxbow_mission.incoming import PutRequest, QueriedPlan, QueriedRequest
 from oxbow_mission.registry import Registry
@@ -145,14 +147,16 @@ class MissionService(Closing):
         for status in statuses:
             yield mission_key(status.mission_id, "status"), msgspec.json.encode(status)
 
-    def _history(self, key: str, _parameters: dict[str, str], _payload: bytes) -> Replies:
+    def _history(self, key: str, parameters: dict[str, str], _payload: bytes) -> Replies:
         """Plans that are kept: the latest under its mission's key, any under a key of its own."""
-        asked = MissionKey.parse(key)
+        asked, after = MissionKey.parse(key), _after(parameters)
         kept: dict[str, Revision] = {}
         first: dict[str, Revision] = {}
         for each in self.registry.store.planned(_asked_id(asked)):
             number = None if asked.revision is None else each.number
             is_replan = first.setdefault(each.mission_id, each) != each
+            if each.number <= after:
+                continue
             if asked.revision in (None, ANY, each.number) and (asked.what == "plan" or is_replan):
                 kept[str(MissionKey(each.mission_id, asked.what, number))] = each
         _require_kept(kept, asked)
@@ -182,6 +186,14 @@ def _any(what: str, revision: str | None = None) -> str:
 
 def _asked_id(key: MissionKey) -> str | None:
     return None if key.mission_id == ANY else checked_id(key.mission_id)
+
+
+def _after(parameters: dict[str, str]) -> int:
+    """The revision after which plans are asked for."""
+    text = parameters.get("after", "0")
+    if not re.fullmatch(r"[0-9]{1,9}", text):
+        raise InvalidMission(f"is {excerpt(text)}; expected the number of a revision", where="after")
+    return int(text)
 
 
 def _require_kept(found: Sized, asked: MissionKey) -> None:

@@ -20,8 +20,10 @@ __all__ = [
     "Plan",
     "Planned",
     "Ready",
+    "Said",
     "Show",
     "ToHelper",
+    "Told",
 ]
 
 
@@ -93,6 +95,20 @@ class Failed(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     """The error that a check or a run ended in."""
 
     error: ErrorReply
+
+
+class Told(msgspec.Struct, frozen=True, kw_only=True):
+    """What the mission service says, about the order of this number."""
+
+    order: int
+    what: Check | Plan | Answer
+
+
+class Said(msgspec.Struct, frozen=True, kw_only=True):
+    """What a helper process says, about the order of this number: what is about another is no answer."""
+
+    order: int
+    what: Ready | Checked | Ask | Show | Planned | Failed
 
 
 ToHelper = Check | Plan | Answer

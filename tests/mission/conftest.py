@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from mission_processes import STAGES, START_S, Process, end, launch
 
 from oxbow import Client
 from oxbow.bus import Bus
 from oxbow.bus.router import start_router
-
-Process = subprocess.Popen[bytes]
-START_S = 30.0
-
-
-def launch(*arguments: str) -> Process:
-    return subprocess.Popen([sys.executable, *arguments, "--parent", str(os.getpid())])
-
-
-def end(process: Process) -> None:
-    if process.poll() is None:
-        process.send_signal(signal.SIGTERM)
-    process.wait(10.0)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +31,7 @@ def start_stages(router: str) -> Iterator[Callable[[], None]]:
     started: list[Process] = []
 
     def start() -> None:
-        started.append(launch(str(Path(__file__).with_name("trivial_stages.py")), "--connect", router))
+        started.append(launch(STAGES, "--connect", router))
 
     yield start
     for process in started:
@@ -78,7 +62,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def client(router: str, home: Path) -> Iterator[Client]:
     """A client of a service and stages that live as long as the module."""
-    stages = launch(str(Path(__file__).with_name("trivial_stages.py")), "--connect", router)
+    stages = launch(STAGES, "--connect", router)
     service = launch("-m", "oxbow_mission", "--connect", router, "--home", str(home), "--workers", "2")
     with Client(router, timeout_s=START_S) as connected:
         yield connected

@@ -55,10 +55,16 @@ class Session(Closing):
     Callbacks run on zenoh's network thread and only put into a bounded queue, since one that takes its time
     stops the whole session. They are `direct`: zenoh's own helper threads would keep a program that forgot to
     close its session from ending.
+
+    Attributes
+    ----------
+    links
+        How often a link to the router came up: what was put between two links was not heard.
     """
 
     def __init__(self, session: zenoh.Session, endpoint: str) -> None:
         self.endpoint = endpoint
+        self.links = 0
         self._session = session
         self._lock = threading.Lock()
         self._subscriptions: list[Subscription] = []
@@ -313,6 +319,8 @@ class Session(Closing):
             self._asking.discard(cancellation)
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
+        if event.kind == zenoh.SampleKind.PUT:
+            self.links += 1
         if event.kind == zenoh.SampleKind.DELETE:
             give_up = threading.Timer(LINK_LOSS_S, self._give_up_asking)
             give_up.daemon = True
