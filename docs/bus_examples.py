@@ -31,7 +31,7 @@ from oxbow.contracts import (
 )
 from oxbow.envelope import Envelope
 from oxbow.errors import ErrorCode, ErrorReply
-from oxbow.introspection import Info, Ping, Stats
+from oxbow.introspection import Info, Ping, Stats, Supervised, Supervision
 from oxbow.recording import Layer, Stamped
 from oxbow.submission import SubmissionParameters
 
@@ -160,6 +160,10 @@ EXAMPLES: dict[type[msgspec.Struct], msgspec.Struct] = {
             worker_restarts=0,
             session_rss_bytes=48 * 10**6,
             worker_rss_bytes=110 * 10**6,
+        ),
+        Supervision(
+            instance="4200",
+            processes=(Supervised(name="path-1", pid=4242, starts=2, trouble="ended with status -9"),),
         ),
         Stamped(
             mission_id="lake",

@@ -55,13 +55,14 @@ from oxbow.contracts import (
     Vehicle,
     WeightedArea,
     any_introspection_key,
+    introspection_key,
     layer_key,
     live_key,
 )
 from oxbow.envelope import Envelope, StageError
 from oxbow.errors import ErrorCode, ErrorReply
 from oxbow.ids import MOST_ID_CHARACTERS
-from oxbow.introspection import Info, Ping, Stats
+from oxbow.introspection import Info, Ping, Stats, Supervised, Supervision
 from oxbow.recording import Layer, LayerKind, Stamped
 from oxbow.submission import SubmissionParameters
 
@@ -113,6 +114,7 @@ INNER = (
     Leg,
     Fault,
     Layer,
+    Supervised,
 )
 """Messages that only occur inside others, and need no example of their own."""
 
@@ -145,6 +147,11 @@ def _keys() -> str:
         (PLAN_KEY, "query: Mission File in, completed Mission File out", "DSS → mission"),
         (_stage(), "query with an `Envelope` attached", "mission → stages"),
         *((f"{_stage()}/@{what}", "query, JSON", "operators → stages") for what in INTROSPECTION),
+        (
+            _filled(introspection_key("supervisor", "INSTANCE", "processes")),
+            "query, JSON",
+            "operators → `oxbow up`",
+        ),
         (
             _filled(live_key("STAGE", "INSTANCE")),
             "liveliness token",
@@ -191,7 +198,7 @@ def _stages() -> Iterator[str]:
         "`@schema` replies a JSON Schema of both messages. All replicas of all stages are asked with"
         f" `{any_introspection_key('stats')}`; who is alive is the liveliness of `{ANY_LIVE}`.\n"
     )
-    for kind in (Ping, Info, Stats):
+    for kind in (Ping, Info, Stats, Supervision, Supervised):
         yield _message(kind, level=4)
 
 

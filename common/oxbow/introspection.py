@@ -7,7 +7,7 @@ from pathlib import Path
 
 import msgspec
 
-__all__ = ["Info", "Ping", "Stats", "rss_bytes"]
+__all__ = ["Info", "Ping", "Stats", "Supervised", "Supervision", "rss_bytes"]
 
 
 class Ping(msgspec.Struct, frozen=True, kw_only=True):
@@ -48,6 +48,23 @@ class Stats(msgspec.Struct, frozen=True, kw_only=True):
     worker_restarts: int
     session_rss_bytes: int
     worker_rss_bytes: int
+
+
+class Supervised(msgspec.Struct, frozen=True, kw_only=True):
+    """A process that is kept running: how often it was started, and what is wrong with it now, if anything."""
+
+    name: str
+    pid: int
+    starts: int
+    trouble: str = ""
+
+
+class Supervision(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer to ``@processes``, by what keeps the processes of a stack running."""
+
+    stage: str = "supervisor"
+    instance: str
+    processes: tuple[Supervised, ...]
 
 
 def rss_bytes(pid: int) -> int:

@@ -18,9 +18,9 @@ import msgspec
 
 from oxbow.bus import Session
 from oxbow.closing import Closing
-from oxbow.contracts import any_introspection_key
+from oxbow.contracts import any_introspection_key, introspection_key
 from oxbow.errors import DeadlineExceeded, Unavailable
-from oxbow.introspection import Ping
+from oxbow.introspection import Ping, Supervised, Supervision
 from oxbow_cli.supervisor import Child
 
 __all__ = ["Health", "StoppedProcess", "stopped_processes"]
@@ -55,7 +55,7 @@ class _Silence:
 
 
 class Health(Closing):
-    """Watches over the processes of a stack.
+    """Watches over the processes of a stack, and tells on the bus (``@processes``) how they are.
 
     Parameters
     ----------
@@ -77,6 +77,7 @@ class Health(Closing):
         self._session: Session | None = None
         self._router = router
         self._services = services
+        self._own_key = introspection_key("supervisor", str(os.getpid()), "processes")
         self.answering: frozenset[int] = frozenset()
         self._known: set[int] = set()
         self._silences: dict[int, _Silence] = {}
@@ -117,7 +118,20 @@ class Health(Closing):
             self._session = Session.connect(self._endpoint, timeout_s=ANSWER_S)
         except Unavailable:
             return None
+        self._session.answer(self._own_key, self._report)
         return _pings(self._session)
+
+    def _report(self, _key: str, _parameters: dict[str, str], _payload: bytes) -> Iterator[tuple[str, bytes]]:
+        processes = tuple(
+            Supervised(name=child.name, pid=child.pid, starts=child.starts, trouble=self._trouble(child))
+            for child in (self._router, *self._services)
+        )
+        report = Supervision(instance=str(os.getpid()), processes=processes)
+        yield self._own_key, msgspec.json.encode(report)
+
+    def _trouble(self, child: Child) -> str:
+        silence = self._silences.get(child.pid)
+        return child.trouble or (f"has answered nothing for {silence.lasted_s:.1f} s" if silence else "")
 
     def _note(self, silent: dict[int, Child]) -> None:
         """Add this round to the silences; time in which nothing was asked does not count."""

@@ -210,6 +210,10 @@ def print_status(found: StackStatus) -> None:
         processes.add_row(process.service, process.instance, *_process_cells(process))
     for service in found.missing:
         processes.add_row(service, "none")
+    troubled = _grid("Started again", left=("process", "trouble now"), right=("starts", "pid"))
+    for each in found.supervised:
+        if each.trouble or each.starts > 1:
+            troubled.add_row(each.name, each.trouble, str(each.starts), str(each.pid))
     missions = _grid("Missions", left=("mission", "state", "at work", "error"), right=("revision", "done"))
     for mission in found.missions:
         error = f"{mission.error.where}: {mission.error.message}" if mission.error else ""
@@ -217,7 +221,7 @@ def print_status(found: StackStatus) -> None:
         missions.add_row(
             mission.mission_id, mission.state.value, mission.stage, error, str(mission.revision), f"{done:.0%}"
         )
-    _console().print(processes, missions)
+    _console().print(processes, *([troubled] if troubled.row_count else []), missions)
 
 
 _PROCESS_FIGURES = ("up", "served", "failed", "queued", "mean", "p95", "MiB")
@@ -226,7 +230,7 @@ _PROCESS_FIGURES = ("up", "served", "failed", "queued", "mean", "p95", "MiB")
 def _process_cells(process: Process) -> tuple[str, ...]:
     ping, stats = process.ping, process.stats
     if ping is None or stats is None:
-        return ()
+        return ("silent",)
     counts = map(str, (stats.served, stats.failed, stats.queued))
     seconds = (f"{stats.mean_s:.2f} s", f"{stats.p95_s:.2f} s") if stats.served else ("-", "-")
     memory = f"{(stats.session_rss_bytes + stats.worker_rss_bytes) / 2**20:.0f}"

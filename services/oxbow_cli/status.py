@@ -11,7 +11,7 @@ from oxbow.bus import Bus
 from oxbow.client import Client
 from oxbow.contracts import MissionStatus, any_introspection_key
 from oxbow.errors import DeadlineExceeded, Unavailable
-from oxbow.introspection import Ping, Stats
+from oxbow.introspection import Ping, Stats, Supervised, Supervision
 from oxbow_cli.stack import SERVICES
 
 __all__ = ["Process", "StackStatus", "status_of"]
@@ -22,11 +22,11 @@ ANSWER_S = 2.0
 SEEN_S = 0.5
 """How long to wait for a service to be seen alive; those that are there are seen in milliseconds."""
 
-T = TypeVar("T", Ping, Stats)
+T = TypeVar("T", Ping, Stats, Supervision)
 
 
 class Process(msgspec.Struct, frozen=True, kw_only=True):
-    """One process that is seen alive; of a stage that does not hang, with what it tells about itself."""
+    """One process that is seen alive; where it does not hang, with what it tells about itself."""
 
     service: str
     instance: str
@@ -35,12 +35,16 @@ class Process(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class StackStatus(msgspec.Struct, frozen=True, kw_only=True):
-    """The processes of a stack, the services of which there is none, and each mission's latest revision."""
+    """The processes of a stack, the services of which there is none, and each mission's latest revision.
+
+    `supervised` are the processes that `oxbow up` keeps running, those that do not run now, too.
+    """
 
     endpoint: str
     processes: tuple[Process, ...]
     missing: tuple[str, ...]
     missions: tuple[MissionStatus, ...]
+    supervised: tuple[Supervised, ...] = ()
 
 
 def status_of(endpoint: str) -> StackStatus:
@@ -48,6 +52,7 @@ def status_of(endpoint: str) -> StackStatus:
     with Bus.connect(endpoint, timeout_s=ANSWER_S) as bus:
         with suppress(Unavailable):
             bus.wait_ready(SERVICES, SEEN_S)
+        supervisions = _ask(bus, "processes", Supervision).values()
         pings, stats = _ask(bus, "ping", Ping), _ask(bus, "stats", Stats)
         alive = {service: bus.instances(service) for service in SERVICES}  # by now, each replica has been seen
     missions: list[MissionStatus] = []
@@ -63,11 +68,12 @@ def status_of(endpoint: str) -> StackStatus:
         ),
         missing=tuple(service for service, instances in alive.items() if not instances),
         missions=tuple(missions),
+        supervised=tuple(each for supervision in supervisions for each in supervision.processes),
     )
 
 
 def _ask(bus: Bus, what: str, kind: type[T]) -> dict[tuple[str, str], T]:
-    """The answers of all stages' replicas, by stage and instance."""
+    """The answers of all processes, by service and instance."""
     try:
         replies = bus.query(any_introspection_key(what), timeout_s=ANSWER_S, all_targets=True, may_be_empty=True)
     except DeadlineExceeded:

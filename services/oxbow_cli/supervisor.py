@@ -47,6 +47,13 @@ class Child:
     output
         A file descriptor for all that it prints; where absent, this process's stderr.
 
+    Attributes
+    ----------
+    starts
+        How often it has been started.
+    trouble
+        Why it does not run; empty while it does.
+
     Raises
     ------
     Unavailable
@@ -75,6 +82,7 @@ class Child:
             start_new_session=True,
         )
         self.starts += 1
+        self.trouble = ""
         self._started = time.monotonic()
         self._start_again = None
 
@@ -105,6 +113,7 @@ class Child:
                 self._start_later(f"cannot be started: {error}")
 
     def _start_later(self, why: str) -> None:
+        self.trouble = why
         _log.warning("%s %s; again in %.1f s", self.name, why, self._pause_s)
         self._start_again = time.monotonic() + self._pause_s
         self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S)

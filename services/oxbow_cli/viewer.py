@@ -12,6 +12,9 @@ from oxbow.errors import InvalidMission
 
 __all__ = ["find_recording", "open_recording"]
 
+MOST_NAMED = 20
+"""Recordings that an error names."""
+
 _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
@@ -20,8 +23,9 @@ def find_recording(name: str, folder: Path) -> Path:
     path = Path(name) if name.endswith(".rrd") else folder / f"{checked_id(name, where='ID')}.rrd"
     if path.is_file():
         return path
-    kept = sorted(file.stem for file in path.parent.glob("*.rrd"))
-    there = f"; there are {', '.join(kept)}" if kept else ""
+    kept = sorted(file.stem for file in path.parent.glob("*.rrd") if not file.name.startswith("."))
+    others = f" and {len(kept) - MOST_NAMED} more" if len(kept) > MOST_NAMED else ""
+    there = f"; there are {', '.join(kept[:MOST_NAMED])}{others}" if kept else ""
     raise InvalidMission(f"no recording at {path}{there}", where=name)
 
 

@@ -22,10 +22,21 @@ def test_opens_the_viewer_where_there_is_a_screen(oxbow, folder):
 
 def test_an_unknown_mission_is_invalid_input_and_lists_the_known(oxbow, folder):
     (folder / "home" / "recordings").mkdir(parents=True)
+    (folder / "home" / "recordings" / ".pond.0123.part.rrd").touch()
     (folder / "home" / "recordings" / "lake.rrd").touch()
     result = oxbow("inspect", "pond")
     assert result.returncode == 2
     assert "there are lake" in result.stderr
+    assert "part" not in result.stderr
+
+
+def test_of_many_recordings_some_are_named(oxbow, folder):
+    (folder / "home" / "recordings").mkdir(parents=True)
+    for number in range(1_000):
+        (folder / "home" / "recordings" / f"lake{number}.rrd").touch()
+    result = oxbow("inspect", "pond")
+    assert "lake1," in result.stderr
+    assert "and 980 more" in result.stderr
 
 
 def test_an_id_is_no_way_out_of_the_folder(oxbow):

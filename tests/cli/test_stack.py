@@ -46,11 +46,11 @@ def start(folder, environment) -> Iterator[Callable[..., subprocess.Popen[str]]]
     """Start the command, and have it ended with the test."""
     started = []
 
-    def run(*arguments: str) -> subprocess.Popen[str]:
+    def run(*arguments: str, **more: str) -> subprocess.Popen[str]:
         process = subprocess.Popen(
             [*OXBOW, *arguments],
             cwd=folder,
-            env=environment,
+            env=environment | more,
             stdout=subprocess.PIPE,
             text=True,
         )
@@ -190,6 +190,24 @@ def test_what_freezes_is_replaced_and_missions_are_planned_all_the_same(start):
         process.suspend()
     up.kill()
     until(lambda: not running(processes), GONE_S)
+
+
+def test_status_shows_what_does_not_run(start, oxbow, folder):
+    (folder / "oxbow_recorder.py").write_text("raise SystemExit(3)")
+    endpoint = free_endpoint()
+    up = start("up", "--listen", endpoint, PYTHONPATH=str(folder))
+    assert up.stdout.readline() == f"ready: {endpoint}\n"
+    until(lambda: "recorder-1" in started_again(oxbow, endpoint))
+    assert json.loads(oxbow("status", "--connect", endpoint, "--json").stdout)["missing"] == ["recorder"]
+    table = oxbow("status", "--connect", endpoint).stdout
+    assert "Started again" in table
+    assert "recorder-1" in table
+
+
+def started_again(oxbow: Callable[..., subprocess.CompletedProcess[str]], endpoint: str) -> set[str]:
+    """Names of the processes that have been started more than once."""
+    found = json.loads(oxbow("status", "--connect", endpoint, "--json").stdout)
+    return {each["name"] for each in found["supervised"] if each["starts"] > 1}
 
 
 def wait_for_missions(endpoint: str, count: int) -> None:
