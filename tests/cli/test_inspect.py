@@ -42,4 +42,4 @@ def test_of_many_recordings_some_are_named(oxbow, folder):
 def test_an_id_is_no_way_out_of_the_folder(oxbow):
     result = oxbow("inspect", "../../secret")
     assert result.returncode == 2
-    assert "expected one or more of A-Z" in result.stderr
+    assert "of A-Z a-z 0-9" in result.stderr
