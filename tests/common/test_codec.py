@@ -14,9 +14,10 @@ from shapely import LineString, MultiPolygon, Point, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from oxbow import codec
-from oxbow.contracts import Cell, ContourRequest, Message, PathPlan
+from oxbow.contracts import Cell, ContourRequest, DecomposeRequest, Decomposition, Message, PathPlan
 from oxbow.errors import InvalidMission
-from oxbow.recording import Layer
+from oxbow.recording import Layer, discard
+from oxbow_decomposition.service import handle as decompose
 
 SQUARE = box(0.0, 0.0, 10.0, 10.0)
 ISLAND = Polygon(SQUARE.exterior, [box(2.0, 2.0, 4.0, 4.0).exterior])
@@ -157,3 +158,14 @@ def test_a_message_is_checked_where_it_is_made_too() -> None:
         ContourRequest(outline=box(0, 0, 1e200, 1.0), spacing_m=1.0)
     with pytest.raises(InvalidMission, match="path: is empty; expected a line"):
         PathPlan(path=LineString(), spacing_m=1.0, steps=())
+
+
+def test_cells_of_another_heading_are_refused() -> None:
+    request = DecomposeRequest(free=box(0.0, 0.0, 30.0, 10.0), spacing_m=2.0, heading_rad=0.3)
+    right = msgspec.msgpack.decode(codec.encode(decompose(request, discard)))
+    for heading_rad in (0.31, 1e300):
+        with pytest.raises(InvalidMission, match=r"cells\[0\]: begins or ends .* m from its critical points"):
+            codec.decode(msgspec.msgpack.encode(right | {"heading_rad": heading_rad}), Decomposition)
+    cells = [right["cells"][0] | {"start": 9}, *right["cells"][1:]]
+    with pytest.raises(InvalidMission, match=r"cells\[0\]: joins the critical points 9 and"):
+        codec.decode(msgspec.msgpack.encode(right | {"cells": cells}), Decomposition)

@@ -142,6 +142,18 @@ def test_tension_keeps_the_length():
         assert np.hypot(*np.diff(nodes, axis=0).T).sum() <= share * path.length_m
 
 
+@pytest.mark.parametrize("heaviest", [1e12, 1e18, 1e24])
+def test_samples_that_pull_far_more_than_others_leave_a_solution(heaviest):
+    path = Polyline.of(MEANDER, SQUARE.buffer(1e-6)).divided(60.0)
+    samples = Samples.over(SQUARE, 25.0)
+    at = feet(path, samples.points, 250.0)
+    pulls = np.ones(len(samples))
+    inner = np.flatnonzero((at.share > 0.2) & (at.share < 0.8))
+    pulls[inner[np.unique(at.segment[inner], return_index=True)[1][::9]]] = heaviest
+    pull = Pull.of(path, samples, at, pulls, step=0.5, spacing_m=250.0)
+    assert np.isfinite(pull.fitted(path.length_m, None, 250.0).nodes).all()
+
+
 def test_a_lattice_leaves_no_hole():
     water = lake(3)
     samples = Samples.over(water, 40.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 
 import numpy as np
 from shapely import Polygon
@@ -17,7 +18,7 @@ from oxbow.contracts.message import (
     require_place,
 )
 from oxbow.errors import InvalidMission
-from oxbow.tolerances import FARTHEST_M
+from oxbow.tolerances import FARTHEST_M, ROUNDING_M
 
 __all__ = ["Cell", "CriticalKind", "CriticalPoint", "DecomposeRequest", "Decomposition", "HeadingScore"]
 
@@ -111,3 +112,19 @@ class Decomposition(Message, frozen=True, kw_only=True):
                     f"joins the critical points {cell.start} and {cell.end}; there are {most}",
                     where=f"cells[{number}]",
                 )
+        self._require_ends()
+
+    def _require_ends(self) -> None:
+        """Every cell begins and ends at its critical points, or they are of another heading or water."""
+        if not self.cells:
+            return
+        x, y = np.array([point.place for point in self.critical_points]).T
+        u = x * math.cos(self.heading_rad) - y * math.sin(self.heading_rad)
+        points = u[[(cell.start, cell.end) for cell in self.cells]]
+        ends = np.array([(cell.floor[0, 0], cell.floor[-1, 0]) for cell in self.cells])
+        off_m = np.abs(points - ends).max(axis=1)
+        if off_m.max() > ROUNDING_M:
+            worst = int(off_m.argmax())
+            raise InvalidMission(
+                f"begins or ends {off_m[worst]:g} m from its critical points", where=f"cells[{worst}]"
+            )

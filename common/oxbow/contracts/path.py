@@ -39,6 +39,10 @@ class Draw(enum.StrEnum):
     CONVEX_COMBINATION = "convex-combination"
 
 
+MOST_WEIGHT = 1e6
+"""Water that is more important than this leaves nothing for the rest."""
+
+
 class WeightedArea(Message, frozen=True, kw_only=True):
     """Where sampling is `weight` times as important as elsewhere, where the weight is 1."""
 
@@ -47,7 +51,7 @@ class WeightedArea(Message, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         require_area(self, "area")
-        require_finite(self, "weight", least=0.0)
+        require_finite(self, "weight", least=0.0, most=MOST_WEIGHT)
 
 
 class PathRequest(Message, frozen=True, kw_only=True):

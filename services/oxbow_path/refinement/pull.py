@@ -22,6 +22,10 @@ STEP = 0.15
 INERTIA = 0.3
 """How strongly a node holds to its place, against the median pull of the samples."""
 
+EXACTNESS = 1e-10
+"""The same against the pull on itself: where one sample pulls far more than all others, rounding leaves a pair of
+nodes nothing that holds it, and the equations no solution."""
+
 TENSION_RANGE = (1e-4, 1e3)
 """The tension first looked for, in median pulls times the spacing."""
 
@@ -114,12 +118,12 @@ class Pull:
         diagonal = gathered(first * (1.0 - at.share), second * at.share)
         right = np.column_stack([gathered(first * axis, second * axis) for axis in goal.T])
         beside = gathered(first * at.share, np.zeros_like(second))[:-1]
-        hold = INERTIA * float(np.median(diagonal[diagonal > 0]))
+        hold = INERTIA * float(np.median(diagonal[diagonal > 0])) + EXACTNESS * diagonal
         return cls(
             path,
             diagonal + hold,
             beside,
-            right + hold * path.nodes,
+            right + hold[:, None] * path.nodes,
             1.0 / np.maximum(path.lengths_m, SHORTEST * spacing_m),
         )
 
