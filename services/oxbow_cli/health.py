@@ -8,9 +8,10 @@ from __future__ import annotations
 import logging
 import os
 import signal
+import socket
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +20,7 @@ import msgspec
 from oxbow.bus import Session
 from oxbow.closing import Closing
 from oxbow.contracts import any_introspection_key, introspection_key
-from oxbow.errors import DeadlineExceeded, Unavailable
+from oxbow.errors import OxbowError, Unavailable
 from oxbow.introspection import Ping, Supervised, Supervision
 from oxbow_cli.supervisor import Child
 
@@ -39,6 +40,9 @@ BUSY_S = 20.0
 
 START_S = 30.0
 """How long a process may take to answer its first ping."""
+
+HANDLES_TO_JOIN = 16
+"""File handles that joining a router takes, and some more."""
 
 _BUSY_SHARE = 0.1
 """A process that uses less of a processor than this does nothing."""
@@ -117,6 +121,7 @@ class Health(Closing):
         try:
             self._session = Session.connect(self._endpoint, timeout_s=ANSWER_S)
         except Unavailable:
+            _require_handles()
             return None
         self._session.answer(self._own_key, self._report)
         return _pings(self._session)
@@ -163,9 +168,20 @@ def _pings(session: Session) -> set[int]:
     key = any_introspection_key("ping")
     try:
         replies = session.query(key, timeout_s=ANSWER_S, all_targets=True, may_be_empty=True)
-    except (DeadlineExceeded, Unavailable):
+    except OxbowError:
         return set()
-    return {msgspec.json.decode(payload, type=Ping).pid for _key, payload in replies}
+    pids = set()
+    for _key, payload in replies:
+        with suppress(msgspec.DecodeError):  # anyone may answer
+            pids.add(msgspec.json.decode(payload, type=Ping).pid)
+    return pids
+
+
+def _require_handles() -> None:
+    """Raise `OSError` where this process has too few handles left to join: that says nothing of the router."""
+    with ExitStack() as held:
+        for _ in range(HANDLES_TO_JOIN):
+            held.enter_context(socket.socket())
 
 
 def _kill(stopped: StoppedProcess, leader: Child) -> None:

@@ -10,7 +10,7 @@ import msgspec
 from oxbow.bus import Bus
 from oxbow.client import Client
 from oxbow.contracts import MissionStatus, any_introspection_key
-from oxbow.errors import DeadlineExceeded, Unavailable
+from oxbow.errors import OxbowError, Unavailable
 from oxbow.introspection import Ping, Stats, Supervised, Supervision
 from oxbow_cli.stack import SERVICES
 
@@ -76,7 +76,11 @@ def _ask(bus: Bus, what: str, kind: type[T]) -> dict[tuple[str, str], T]:
     """The answers of all processes, by service and instance."""
     try:
         replies = bus.query(any_introspection_key(what), timeout_s=ANSWER_S, all_targets=True, may_be_empty=True)
-    except DeadlineExceeded:
+    except OxbowError:
         return {}
-    answers = (msgspec.json.decode(payload, type=kind) for _key, payload in replies)
-    return {(answer.stage, answer.instance): answer for answer in answers}
+    answers = {}
+    for _key, payload in replies:
+        with suppress(msgspec.DecodeError):  # anyone may answer
+            answer = msgspec.json.decode(payload, type=kind)
+            answers[answer.stage, answer.instance] = answer
+    return answers

@@ -196,9 +196,10 @@ class Supervisor:
             try:
                 step()
                 pause_s = period_s
-            except Exception:  # noqa: BLE001 - whatever it was, the children still need looking after
+            except BaseException as error:  # noqa: BLE001 - a panic of zenoh's is no Exception
                 pause_s = min(2 * pause_s, _LONGEST_PAUSE_S)
-                _log.exception("%s: looked after again in %.1f s", name, pause_s)
+                known = isinstance(error, OSError)
+                _log.error("%s: %s; again in %.1f s", name, error, pause_s, exc_info=not known)
 
     def __enter__(self) -> Self:
         return self

@@ -127,9 +127,7 @@ class Runs(Closing):
             self._let_go_of_runs()
             self._let_go_of_writers()
             self._admit_waiting()
-            if self._refused:
-                _log.warning("%d layers of runs that found no room are not recorded", self._refused)
-                self._refused = 0
+            self._note_refused()
 
     def counts(self) -> Counts:
         """How much is done, and how much is being done."""
@@ -148,6 +146,8 @@ class Runs(Closing):
         with self._lock:
             for waiting in tuple(self._waiting.values()):
                 self._admit(waiting)
+            self._refused += sum(len(waiting.payloads) for waiting in self._waiting.values())
+            self._note_refused()
             for recorded in tuple(self._open.values()):
                 self._finish(recorded)
             writers, self._writers = self._writers, []
@@ -208,6 +208,11 @@ class Runs(Closing):
         """The recorded run to let go: one that shows nothing any more, or else the one that has shown least."""
         recent = self._clock() - RECENT_S
         return min(self._open.values(), key=lambda each: (each.seen > recent, each.layers, each.seen))
+
+    def _note_refused(self) -> None:
+        if self._refused:
+            _log.warning("%d layers of runs that found no room are not recorded", self._refused)
+            self._refused = 0
 
     # ----------------------------------------------------------------- recorded
 

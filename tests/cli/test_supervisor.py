@@ -10,12 +10,15 @@ import time
 import psutil
 import pytest
 
+from oxbow.bus import Session
 from oxbow.bus.router import free_endpoint
+from oxbow.contracts import introspection_key
 from oxbow_cli.health import Health, stopped_processes
 from oxbow_cli.supervisor import Supervisor
 
 pytestmark = pytest.mark.processes
 
+STRANGE = introspection_key("s", "stranger", "ping")
 SLEEPER = ("-c", "import time; time.sleep(600)")
 PARENT = ("-c", "import subprocess, sys; subprocess.run(['sleep', '600'])")
 DEAF = """
@@ -175,9 +178,11 @@ def test_what_answers_no_ping_is_replaced_and_what_answers_or_computes_is_not(su
     supervisor.repeat(ask, 0.1, "pings", at_end=health.close)
     until(lambda: {child.pid for child in children} <= answered)
     first = deaf.pid
-    os.kill(first, signal.SIGUSR1)
-    os.kill(busy.pid, signal.SIGUSR2)
-    until(lambda: deaf.pid != first and deaf.pid in answered)
+    with Session.connect(endpoint) as stranger:
+        stranger.answer(STRANGE, lambda *_: [(STRANGE, b"no ping")])
+        os.kill(first, signal.SIGUSR1)
+        os.kill(busy.pid, signal.SIGUSR2)
+        until(lambda: deaf.pid != first and deaf.pid in answered)
     assert busy.pid not in health.answering
     assert busy.starts == well.starts == router.starts == 1
 
