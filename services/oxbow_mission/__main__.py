@@ -45,9 +45,9 @@ def main(argv: list[str] | None = None) -> None:
 
 def _serve(bus: Bus, registry: Registry, options: argparse.Namespace, lifetime: Lifetime) -> None:
     vitals = Vitals(bus, options.instance, registry.store.waiting)
-    planner = Planner(registry, bus, vitals, options.workers, memory_mb=options.memory_mb, on_failure=lifetime.end)
     reports = Reports(registry.store.database, registry.store)
     with (
+        Planner(registry, bus, vitals, options.workers, options.memory_mb, lifetime.end) as planner,
         Checks(options.memory_mb) as checks,
         MissionService(bus, registry, reports, checks, options.instance),
     ):

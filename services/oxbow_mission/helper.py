@@ -240,6 +240,7 @@ class Helpers(Closing):
         self.memory_mb = memory_mb
         self._lock = threading.Lock()
         self._idle: list[Helper] = []
+        self._closed = False
 
     @contextmanager
     def one(self) -> Iterator[Helper]:
@@ -251,9 +252,12 @@ class Helpers(Closing):
         finally:
             with self._lock:
                 self._idle.append(helper)
+                if self._closed:
+                    helper.close()
 
     def close(self) -> None:
-        """End those that are idle."""
+        """End those that are idle, and the others when their order is carried out."""
         with self._lock:
+            self._closed = True
             for helper in self._idle:
                 helper.close()

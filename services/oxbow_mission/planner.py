@@ -13,6 +13,7 @@ import msgspec
 
 from oxbow.bus import Bus, BusCall
 from oxbow.bus.query import MSGPACK
+from oxbow.closing import Closing
 from oxbow.contracts import STAGES, any_layer_key, layer_key
 from oxbow.errors import DeadlineExceeded, ErrorReply, Internal, OxbowError, Unavailable, described
 from oxbow.submission import SubmissionParameters
@@ -28,11 +29,14 @@ __all__ = ["Planner"]
 GRACE_S = 5.0
 """How much longer than the deadline a run may take, so that a stage's own words about it arrive."""
 
+END_S = 2.0
+"""How long to wait for threads whose runs were stopped."""
+
 _ENDPOINTS = {endpoint.stage: endpoint for endpoint in STAGES}
 _log = logging.getLogger(__name__)
 
 
-class Planner:
+class Planner(Closing):
     """Threads that have planned what the registry has accepted, until it is closed.
 
     A stage that is missing is waited for until the mission's deadline: an accepted mission is not given up
@@ -53,6 +57,8 @@ class Planner:
         What a helper process may take.
     on_failure
         Called when an outcome cannot be kept or published: this process had better start anew.
+    handler
+        What the helper processes do, as ``package.module:attribute``.
     """
 
     def __init__(
@@ -63,11 +69,12 @@ class Planner:
         workers: int,
         memory_mb: int,
         on_failure: Callable[[], None],
+        handler: str = "oxbow_mission.run:plan",
     ) -> None:
         self.registry = registry
         self.bus = bus
         self.vitals = vitals
-        self.helpers = Helpers("oxbow_mission.run:plan", memory_mb)
+        self.helpers = Helpers(handler, memory_mb)
         self.on_failure = on_failure
         self.failed = False
         self.turns = Turns(lambda stage: len(bus.instances(stage)))
@@ -79,6 +86,13 @@ class Planner:
         ]
         for thread in self._threads:
             thread.start()
+
+    def close(self) -> None:
+        """Stop what is being planned, which waits in the store for another time."""
+        self.registry.close()
+        self.helpers.close()
+        for thread in self._threads:
+            thread.join(END_S)
 
     def _work(self) -> None:
         try:

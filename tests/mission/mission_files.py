@@ -11,10 +11,20 @@ from typing import Any
 from oxbow.bus import Session
 from oxbow.mission import Mission
 
-__all__ = ["BLOOM", "BROKEN_SEED", "INFEASIBLE_SEED", "Samples", "listening", "mission_file", "revision_of"]
+__all__ = [
+    "BLOOM",
+    "BROKEN_SEED",
+    "INFEASIBLE_SEED",
+    "POISON_SEED",
+    "Samples",
+    "listening",
+    "mission_file",
+    "revision_of",
+]
 
 INFEASIBLE_SEED = 1_000_001
 BROKEN_SEED = 1_000_002
+POISON_SEED = 1_000_003
 """Any other seed is the time that the trivial path stage takes, in milliseconds."""
 
 BLOOM = {

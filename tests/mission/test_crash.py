@@ -15,7 +15,7 @@ from pathlib import Path
 import msgspec
 import psutil
 import pytest
-from mission_files import INFEASIBLE_SEED, listening, mission_file, revision_of
+from mission_files import INFEASIBLE_SEED, POISON_SEED, listening, mission_file, revision_of
 
 from oxbow import Client
 from oxbow.bus import Bus
@@ -86,6 +86,33 @@ def test_what_was_kept_but_not_yet_published_is_published_at_the_start(
     assert msgspec.json.decode(heard[1][1], type=MissionStatus).state is MissionState.DONE
 
 
+def test_a_poisoned_mission_fails_alone_though_the_service_is_killed(
+    router: str, start_service: Callable[[], Process], start_stages: Callable[[], None]
+) -> None:
+    start_stages()
+    service = start_service()
+    with Client(router, timeout_s=WAIT_S) as client:
+        for number in range(10):
+            seed = POISON_SEED if number == 3 else 50
+            client.submit(mission_file(), mission_id=f"lake-{number}", seed=seed)
+        for _ in range(3):
+            service.kill()
+            service.wait()
+            service = start_service()
+            give_up = time.monotonic() + WAIT_S
+            while not client.statuses():
+                assert time.monotonic() < give_up
+        statuses = client.statuses()
+        while not all(status.state.is_final for status in statuses):
+            assert time.monotonic() < give_up
+            time.sleep(0.05)
+            statuses = client.statuses()
+    failed = [status for status in statuses if status.state is MissionState.FAILED]
+    assert [status.mission_id for status in failed] == ["lake-3"]
+    assert failed[0].error is not None
+    assert "no answer" in failed[0].error.message
+
+
 def test_killed_at_random_moments(
     router: str, bus: Bus, start_service: Callable[[], Process], start_stages: Callable[[], None]
 ) -> None:
@@ -115,7 +142,7 @@ def test_killed_at_random_moments(
         submitted = [pool.submit(submit_twice, number) for number in range(MISSIONS)]
         for _ in range(KILLS):
             for _ in range(moments.randrange(30)):
-                heard.acquire(timeout=1.0)
+                heard.acquire(timeout=0.2)
             service.kill()
             service.wait()
             service = start_service()

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import struct
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from typing import Any
 
-from mission_files import BROKEN_SEED, INFEASIBLE_SEED
+import msgspec
+from mission_files import BROKEN_SEED, INFEASIBLE_SEED, POISON_SEED
 from shapely import LineString
 
 from oxbow import codec
@@ -102,13 +104,20 @@ def answering(
         request_id = Envelope.decode(query.attachment).request_id
         with query:
             try:
-                reply = codec.encode(handle(codec.decode(query.payload, endpoint.request)))
+                request = codec.decode(query.payload, endpoint.request)
+                reply = NESTED if getattr(request, "seed", 0) == POISON_SEED else codec.encode(handle(request))
                 query.reply(key, reply, encoding=MSGPACK, attachment=request_id.encode())
             except Exception as error:  # noqa: BLE001 - as a stage does
                 known = error if isinstance(error, OxbowError) else Internal(described(error), where=key)
                 query.fail(StageError.about(request_id, ErrorReply.of(known)))
 
     return lambda query: pool.submit(answer, query)
+
+
+NESTED = msgspec.msgpack.encode(
+    {"path": struct.pack("<BII", 1, 7, 1) * 200_000 + struct.pack("<BII", 1, 2, 0), "spacing_m": 10.0, "steps": []}
+)
+"""The reply of a path stage, with collections in one another as its path: libraries run out of stack over it."""
 
 
 HANDLERS: tuple[tuple[Endpoint[Any, Any], Callable[[Any], Message]], ...] = (
