@@ -8,6 +8,7 @@ and the whole path stays simple.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,7 +16,7 @@ from functools import cached_property
 import numpy as np
 import shapely
 from msgspec import structs
-from shapely import LineString, Point, Polygon
+from shapely import LineString, MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
@@ -32,6 +33,8 @@ HALVINGS = 8
 """How often that distance may be halved until both ways fit."""
 GATES = 48
 """Places of a share's rim that may be its gate, at most about."""
+NEAR_GATES = 10.0
+"""Gates of the way out and home that are no farther apart than so many times their legs become one."""
 OFF_M = 1e-2
 """A leg that strays so little from the water stays in it: what the certificate takes for the shore."""
 FAR = 0.25
@@ -120,11 +123,19 @@ class Approach:
             home = None if self.home is None else self.home.points[::-1]
             yield _Candidate(out, path, home)
             return
+        if self.launch != self.recovery:
+            yield _Candidate(self.out.points, path, self.home.points[::-1])
         line = LineString(path)
         for apart_m in self.apart_m * 0.5 ** np.arange(HALVINGS):
-            inner = shapely.get_coordinates(substring(line, 2.0 * apart_m, line.length - 2.0 * apart_m))
-            for side, way in itertools.product((1.0, -1.0), (inner, inner[::-1])):
+            for side, way in itertools.product((1.0, -1.0), self._ways_round(line, apart_m)):
                 yield _Candidate(self.out.beside(side * apart_m), way, self.home.beside(-side * apart_m)[::-1])
+
+    def _ways_round(self, line: LineString, apart_m: float) -> list[FloatArray]:
+        """The path between the gates; either way round, and open by the width of both legs, where they are one."""
+        if self.launch != self.recovery:
+            return [shapely.get_coordinates(line)]
+        inner = shapely.get_coordinates(substring(line, 2.0 * apart_m, line.length - 2.0 * apart_m))
+        return [inner, inner[::-1]]
 
     def _keeps_to_water(self, leg: LineString) -> bool:
         return bool(leg.difference(self.water.buffer(OFF_M)).length == 0.0)
@@ -194,25 +205,26 @@ class Harbour:
             No way through the free space leads there.
         """
         start, recovery = vehicle.start, vehicle.recovery
-        out_is_remote, home_is_remote = (self._is_remote(share, place) for place in (start, recovery))
-        remote = [start] * out_is_remote + [recovery] * home_is_remote
-        if not (out_is_remote or home_is_remote):
+        remote = [place for place in dict.fromkeys((start, recovery)) if self._is_remote(share, place)]
+        if not remote:
             return Approach(structs.replace(self.space, free=share), start, recovery)
-        found = self._to_gate(share, start if out_is_remote else recovery)
-        lanes, way = found.lanes, found.line
-        gate: Place = (float(way[-1, 0]), float(way[-1, 1]))
-        home = np.vstack([lanes.way(recovery, way[-2]), gate]) if out_is_remote and recovery != start else way
-        # The gate becomes a vertex: no path in the share passes between it and the rim.
-        share = shapely.snap(share, Point(gate), ROUNDING_M)
-        water = share if out_is_remote and home_is_remote else self.space.water
+        ways = {place: self._to_gate(share, place) for place in remote}
+        if len(ways) == 2:
+            ways[recovery] = _to_one_gate(ways[start], ways[recovery], recovery)
+        # The gates become vertices: no path in the share passes between them and the rim.
+        for way in ways.values():
+            share = shapely.snap(share, Point(way.gate), ROUNDING_M)
+        water = share if start in ways and recovery in ways else self.space.water
         return Approach(
             space=structs.replace(self.space, free=share, water=water),
-            launch=gate if out_is_remote else start,
-            recovery=gate if home_is_remote else recovery,
-            water=shapely.union_all([self.space.free, *map(lanes.beside_entry, remote)]),
-            out=self._middle_line(way, start) if out_is_remote else None,
-            home=self._middle_line(home, recovery) if home_is_remote else None,
-            apart_m=lanes.apart_m,
+            launch=ways[start].gate if start in ways else start,
+            recovery=ways[recovery].gate if recovery in ways else recovery,
+            water=shapely.union_all(
+                [self.space.free, *(way.lanes.beside_entry(place) for place, way in ways.items())]
+            ),
+            out=self._middle_line(ways[start].line, start) if start in ways else None,
+            home=self._middle_line(ways[recovery].line, recovery) if recovery in ways else None,
+            apart_m=min(way.lanes.apart_m for way in ways.values()),
         )
 
     def _middle_line(self, points: FloatArray, place: Place) -> MiddleLine:
@@ -245,8 +257,12 @@ class _Lanes:
         return self.space.free.buffer(-2.0 * self.apart_m, quad_segs=2)
 
     @cached_property
+    def _inside(self) -> Polygon | MultiPolygon:
+        return self.space.free.buffer(-1.5 * self.apart_m, quad_segs=2)
+
+    @cached_property
     def _router(self) -> Router:
-        return make_router(RouteMethod.VISIBILITY, self.space.free.buffer(-1.5 * self.apart_m, quad_segs=2))
+        return make_router(RouteMethod.VISIBILITY, self._inside)
 
     def way(self, place: Place, goal: Place | FloatArray) -> FloatArray:
         """The middle line from a place, ashore or not, to another in the middle of the free space."""
@@ -264,9 +280,13 @@ class _Lanes:
             return None
         line = LineString(self._router.route(entry[-1], gates[np.argmin(distances)]).polyline)
         # From where it is near, straight on: one side of a leg that met the rim at a slant would lie in the share.
-        near = shapely.points(shapely.get_coordinates(line.intersection(share.buffer(2.0 * self.apart_m))))
-        far = shapely.get_coordinates(substring(line, 0.0, float(shapely.line_locate_point(line, near).min())))
-        gate = shapely.get_coordinates(shapely.shortest_line(share, Point(far[-1])))[0]
+        rim = share.boundary.intersection(self._inside)
+        near = shapely.get_coordinates(line.intersection(rim.buffer(2.0 * self.apart_m)))
+        if not len(near):
+            return None
+        first_m = shapely.line_locate_point(line, shapely.points(near)).min()
+        far = shapely.get_coordinates(substring(line, 0.0, float(first_m)))
+        gate = shapely.get_coordinates(shapely.shortest_line(rim, Point(far[-1])))[0]
         return np.vstack([entry[:-1], far, gate])
 
     def beside_entry(self, place: Place) -> BaseGeometry:
@@ -286,6 +306,18 @@ class _Way:
 
     lanes: _Lanes
     line: FloatArray
+
+    @property
+    def gate(self) -> Place:
+        """Where it ends."""
+        return float(self.line[-1, 0]), float(self.line[-1, 1])
+
+
+def _to_one_gate(out: _Way, home: _Way, recovery: Place) -> _Way:
+    """The way home, by the gate of the way out where its own is right beside it."""
+    if math.dist(out.gate, home.gate) > NEAR_GATES * out.lanes.apart_m:
+        return home
+    return _Way(out.lanes, np.vstack([out.lanes.way(recovery, out.line[-2]), out.gate]))
 
 
 def _edge_middles(area: BaseGeometry, most: int) -> FloatArray:

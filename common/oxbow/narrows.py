@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-__all__ = ["least_basin_m2", "without_narrows"]
+__all__ = ["is_basin", "without_narrows"]
 
 MITRE = 5.0
 """Corners of the shore stay as they are down to an angle of 23 degrees; the tips of sharper ones are narrows."""
@@ -50,13 +48,13 @@ def without_narrows(water: Polygon | MultiPolygon, width_m: float) -> MultiPolyg
     return _sorted(water.intersection(grown))
 
 
-def least_basin_m2(safety_m: float, width_m: float) -> float:
-    """The area from which on a connected part of the free space is a basin, not a wide spot of a narrow water.
+def is_basin(part: Polygon, safety_m: float, width_m: float) -> bool:
+    """Whether a connected part of the free space is a basin, not a wide spot of a narrow water.
 
-    That of a disc as wide as the narrowest water that may be passed freely. A leg through narrow water may pass
-    wide spots; it may not pass a basin, whose own free water lies nearer.
+    A wide spot fits into a circle as wide as the safety distance: a leg through narrow water may pass it. No leg
+    may pass a basin, whose own free water lies nearer.
     """
-    return math.pi * max(safety_m, width_m / 2) ** 2
+    return float(shapely.minimum_bounding_radius(part)) > max(safety_m, width_m) / 2
 
 
 def _rings(water: Polygon | MultiPolygon) -> tuple[int, int]:

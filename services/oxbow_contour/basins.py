@@ -10,7 +10,7 @@ from shapely import MultiPolygon, Point, Polygon
 
 from oxbow.contracts import ContourRequest, Place
 from oxbow.errors import Infeasible
-from oxbow.narrows import least_basin_m2
+from oxbow.narrows import is_basin
 from oxbow.route import Routes
 from oxbow.tolerances import ROUNDING_M
 
@@ -21,8 +21,8 @@ def require_reachable(parts: Sequence[Polygon], water: Polygon, request: Contour
     """Check that a way from each of the request's places comes to the planned free space before any other.
 
     Only the first and the last stretch of a path may be nearer to the shore than the safety distance: from a place
-    to the first free water there is. From a basin that the safety distance cuts off, no way leads on. Free water
-    smaller than `least_basin_m2` is no basin, but a wide spot on the way.
+    to the first free water there is. From a basin that the safety distance cuts off, no way leads on. What is no
+    basin is a wide spot on the way (`is_basin`).
 
     Parameters
     ----------
@@ -38,8 +38,8 @@ def require_reachable(parts: Sequence[Polygon], water: Polygon, request: Contour
     Infeasible
         A place lies by another basin; `where` names it as `places[i]`.
     """
-    least_m2 = least_basin_m2(request.safety_m, request.least_width_m)
-    basins = [parts[0], *(part for part in parts[1:] if part.area >= least_m2)]
+    safety_m, width_m = request.safety_m, request.least_width_m
+    basins = [parts[0], *(part for part in parts[1:] if is_basin(part, safety_m, width_m))]
     if len(basins) == 1:
         return
     routes = Routes(water)

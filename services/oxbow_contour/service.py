@@ -9,7 +9,7 @@ from shapely import MultiPolygon, Polygon
 
 from oxbow.contracts import ContourRequest, DroppedPart, FreeSpace
 from oxbow.errors import Infeasible
-from oxbow.narrows import least_basin_m2, without_narrows
+from oxbow.narrows import is_basin, without_narrows
 from oxbow.recording import Layer, LayerKind, Show
 from oxbow_contour.basins import require_reachable
 from oxbow_contour.free_space import Eroded, erode_water
@@ -64,9 +64,8 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
 
 def _other_waters(waters: Sequence[Polygon], home: Polygon, request: ContourRequest) -> Iterator[DroppedPart]:
     """The waters that are not planned on, but for what is too small to matter."""
-    least_m2 = least_basin_m2(request.safety_m, request.least_width_m)
     for part in waters:
-        if part.area >= least_m2 and part is not home:
+        if part is not home and is_basin(part, request.safety_m, request.least_width_m):
             yield _dropped(part, OTHER_WATER)
 
 

@@ -10,8 +10,9 @@ enough for them. Here a leg ends on the ring, and the way back opens from nothin
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -70,6 +71,20 @@ class Access:
     def line(self) -> LineString:
         """The leg as a line."""
         return LineString(self.leg)
+
+    def along(self, other: Access) -> Access:
+        """The same, on along another leg from where it first meets it; unless the other one meets it earlier."""
+        mine, its = self._first_meeting_m(other), other._first_meeting_m(self)
+        if mine > its:
+            return self
+        rest = substring(other.line, other.line.project(self.line.interpolate(mine)), other.line.length)
+        points = np.vstack([shapely.get_coordinates(substring(self.line, 0.0, mine)), rest.coords])
+        apart = np.hypot(*np.diff(points, axis=0).T) > ROUNDING_M
+        return replace(self, leg=points[np.concatenate([[True], apart])])
+
+    def _first_meeting_m(self, other: Access) -> float:
+        common = shapely.get_coordinates(self.line.intersection(other.line.buffer(ROUNDING_M)))
+        return float(shapely.line_locate_point(self.line, shapely.points(common)).min(initial=math.inf))
 
     @property
     def ashore(self) -> bool:
@@ -138,7 +153,8 @@ def _beside_leg(leg: FloatArray, landing: Landing, water: BaseGeometry) -> BaseG
     """Where a leg may run: near itself in the water, and over land on its straight way."""
     line = LineString(leg)
     near = line.buffer(OPENING * line.length + ROUNDING_M)
-    afloat = water.intersection(box(*near.bounds)).buffer(landing.off_shore_m + ROUNDING_M).intersection(near)
+    graze_m = (HAIR_M if landing.is_ashore else landing.off_shore_m) + ROUNDING_M
+    afloat = water.intersection(box(*near.bounds)).buffer(graze_m).intersection(near)
     if not landing.is_ashore:
         return afloat
     return afloat.union(LineString([landing.place, landing.berth]).buffer(ON_SHORE_M))
@@ -201,12 +217,23 @@ def _candidates(
     region: Polygon, launch: Access, recovery: Access, passable: Passable, opening_m: float, detail_m: float
 ) -> Iterator[LineString]:
     if launch.place == recovery.place:
-        return _closed(region.exterior, launch, passable.free_and_rounding, opening_m)
+        yield from _closed(region.exterior, launch, launch, passable.free_and_rounding, opening_m)
+        return
+    if _meet(launch, recovery):
+        out, home = launch.along(recovery), recovery.along(launch)
+        yield from _closed(region.exterior, out, home, passable.free_and_rounding, opening_m)
     # What the region encloses may be land.
     inside = largest(region.intersection(passable.free))
     if _on(region.exterior, recovery) and not _on(region.exterior, launch):
-        return (path.reverse() for path in _open(inside, recovery, launch, opening_m, detail_m))
-    return _open(inside, launch, recovery, opening_m, detail_m)
+        yield from (path.reverse() for path in _open(inside, recovery, launch, opening_m, detail_m))
+    else:
+        yield from _open(inside, launch, recovery, opening_m, detail_m)
+
+
+def _meet(launch: Access, recovery: Access) -> bool:
+    """Whether two legs meet before the free space, as those of two places up one creek do."""
+    is_long = min(launch.line.length, recovery.line.length) > ROUNDING_M
+    return is_long and bool(shapely.dwithin(launch.line, recovery.line, ROUNDING_M))
 
 
 def _on(ring: LinearRing, access: Access) -> bool:
@@ -228,13 +255,15 @@ def _meeting(ring: LineString, entry: Point, free: BaseGeometry) -> float:
     return float(ring.project(Point(sight.coords[-1])))
 
 
-def _closed(ring: LinearRing, launch: Access, free: BaseGeometry, opening_m: float) -> Iterator[LineString]:
-    """Out to the ring, round it, and back beside the way out."""
+def _closed(
+    ring: LinearRing, launch: Access, recovery: Access, free: BaseGeometry, opening_m: float
+) -> Iterator[LineString]:
+    """Out to the ring, round it, and back beside the way out: to the same place, or to another on the way."""
     line = LineString(ring)
     at = _meeting(line, launch.entry, free)
     round_trip = _part(line, at + opening_m / 2, at - opening_m / 2)
     for side in (1.0, -1.0):
-        back = _beside(launch, opening_m, side)[::-1]
+        back = _beside(recovery, opening_m, side)[::-1]
         yield _chain(launch.leg[:-1], round_trip, back)
         yield _chain(launch.leg[:-1], round_trip[::-1], back)
 
@@ -249,6 +278,8 @@ def _beside(access: Access, offset_m: float, side: float) -> FloatArray:
     afloat_m = np.maximum(along_m - access.land_m, 0.0) / max(steps.sum() - access.land_m, ROUNDING_M)
     aside_m = (HAIR_M if access.ashore else 0.0) + offset_m * afloat_m
     tangent = leg[2:] - leg[:-2]
+    if access.ashore:
+        tangent[0] = leg[1] - leg[0]
     normal = np.column_stack([-tangent[:, 1], tangent[:, 0]]) / np.hypot(*tangent.T)[:, None]
     return np.vstack([leg[:1], leg[1:-1] + side * aside_m[:, None] * normal])
 
