@@ -1,9 +1,11 @@
-"""Shares among clients: whoever was served longest ago is next, however much the others ask for."""
+"""Shares among clients: whoever had least of late is next, however much the others ask for."""
 
 from __future__ import annotations
 
 import itertools
+import math
 import threading
+import time
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -16,27 +18,49 @@ __all__ = ["FairQueue", "Order", "Turns"]
 
 T = TypeVar("T")
 
+HALF_LIFE_S = 60.0
+"""How fast it is forgotten how much a client had."""
+MOST_KNOWN = 10_000
 LOOK_S = 0.5
 """How often those who wait for a turn look whether there is more room."""
 
 
+@dataclass
+class _Use:
+    """When a client was served last, in turns, and how many seconds it had by a moment (`time.monotonic`)."""
+
+    turn: int = 0
+    seconds: float = 0.0
+    at_s: float = 0.0
+
+    def recent_s(self, now_s: float) -> float:
+        """The seconds that it had, those of long ago hardly counted."""
+        return self.seconds * math.exp2((self.at_s - now_s) / HALF_LIFE_S)
+
+
 class Order:
-    """Who was served when; not safe between threads by itself."""
+    """Who is to be served next; not safe between threads by itself."""
 
     def __init__(self) -> None:
         self._turns = itertools.count(1)
-        self._served: dict[str, int] = {}
+        self._uses: dict[str, _Use] = {}
 
     def next(self, clients: Iterable[str]) -> str:
-        """Which of `clients` was served longest ago; the first of those who never were."""
-        return min(clients, key=lambda client: self._served.get(client, 0))
+        """Which of `clients` had the fewest seconds of late; of those, the one that was served longest ago."""
+        now_s = time.monotonic()
 
-    def note(self, client: str) -> None:
-        """Note that a client is served."""
-        self._served.pop(client, None)
-        self._served[client] = next(self._turns)
-        if len(self._served) > 10_000:  # forgotten clients are served as new ones
-            self._served.pop(next(iter(self._served)))
+        def had(client: str) -> tuple[float, int]:
+            use = self._uses.get(client, _Use())
+            return round(use.recent_s(now_s), 1), use.turn
+
+        return min(clients, key=had)
+
+    def note(self, client: str, seconds: float = 0.0) -> None:
+        """Note that a client is served, or that it was for so many seconds."""
+        use, now_s = self._uses.pop(client, _Use()), time.monotonic()
+        self._uses[client] = _Use(next(self._turns), use.recent_s(now_s) + seconds, now_s)
+        if len(self._uses) > MOST_KNOWN:  # who is forgotten is served as someone new
+            self._uses.pop(next(iter(self._uses)))
 
 
 @dataclass
@@ -134,12 +158,14 @@ class Turns:
     def turn(self, what: str, client: str, is_over: Callable[[], bool]) -> Iterator[bool]:
         """Wait for a turn, and have it while the context lasts; False where `is_over` before there was one."""
         granted = self._acquire(what, client, is_over)
+        started = time.monotonic()
         try:
             yield granted
         finally:
             if granted:
                 with self._changed:
                     self._busy[what] -= 1
+                    self._orders[what].note(client, time.monotonic() - started)
                     self._changed.notify_all()
 
     def _acquire(self, what: str, client: str, is_over: Callable[[], bool]) -> bool:

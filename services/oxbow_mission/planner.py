@@ -91,8 +91,9 @@ class Planner(Closing):
         """Stop what is being planned, which waits in the store for another time."""
         self.registry.close()
         self.helpers.close()
+        give_up = time.monotonic() + END_S
         for thread in self._threads:
-            thread.join(END_S)
+            thread.join(max(0.0, give_up - time.monotonic()))
 
     def _work(self) -> None:
         try:

@@ -70,6 +70,18 @@ def test_a_full_disk_loses_no_mission(
         assert [status.mission_id for status in client.statuses()] == ["full"]
 
 
+def test_a_store_that_is_removed_ends_the_service_and_is_not_begun_anew(
+    router: str, tmp_path: Path, start_service: Callable[[], Process]
+) -> None:
+    service = start_service()
+    with Client(router, timeout_s=WAIT_S) as client:
+        client.submit(mission_file(), mission_id="kept")
+        (tmp_path / "missions.sqlite3").unlink()
+        assert service.wait(WAIT_S) == 1
+    assert start_service().wait(WAIT_S) == 4
+    assert not (tmp_path / "missions.sqlite3").exists()
+
+
 def test_what_was_kept_but_not_yet_published_is_published_at_the_start(
     bus: Bus, tmp_path: Path, start_service: Callable[[], Process]
 ) -> None:

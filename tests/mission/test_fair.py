@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from oxbow.errors import Busy
-from oxbow_mission.fair import FairQueue, Turns
+from oxbow_mission.fair import FairQueue, Order, Turns
 
 
 def test_clients_are_served_in_turn() -> None:
@@ -69,6 +69,14 @@ def test_turns_are_taken_one_at_a_time_and_by_whoever_waited_longest_for_one() -
     for thread in threads:
         thread.join(5.0)
     assert served == ["b", "a", "a", "a"]
+
+
+def test_who_had_little_goes_before_who_had_much() -> None:
+    order = Order()
+    for client, seconds in (("slow", 20.0), ("quick", 0.5), ("slow", 0.0)):
+        order.note(client, seconds)
+    assert order.next(["slow", "quick"]) == "quick"
+    assert order.next(["slow", "quick", "new"]) == "new"
 
 
 def test_who_waits_no_longer_has_no_turn() -> None:
