@@ -80,6 +80,8 @@ def decode_json(data: bytes, kind: type[T], name: str, *, at: str = "") -> T:
     except msgspec.ValidationError as error:
         raise _mistyped(str(error), data, kind, name, at) from error
     except msgspec.DecodeError as error:
+        if not data.strip():
+            raise InvalidMission("is empty; expected JSON", where=name) from error
         raise InvalidMission(f"is not JSON: {_located(str(error), data)}", where=name) from error
     except UnicodeDecodeError as error:
         raise InvalidMission("is not JSON: a string is not UTF-8", where=name) from error

@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
-import signal
 import sys
-from types import FrameType
 
-from oxbow_cli.app import app
-from oxbow_cli.exits import INTERRUPTED, exit_status, explain
+from oxbow_cli.interrupts import ending
+from oxbow_cli.streams import tolerate_any_text
 
 __all__ = ["main"]
 
 
 def main() -> None:
     """Run the command; ends the process with its exit status."""
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup leaves it
-            signal.signal(number, _terminate)
+    ending.begin()  # before all that takes time, imports too
+    tolerate_any_text()
+    from oxbow_cli.app import app  # noqa: PLC0415 - as above
+    from oxbow_cli.exits import exit_status, explain  # noqa: PLC0415
+
     try:
         app(prog_name="oxbow")
-    except KeyboardInterrupt:
-        sys.exit(INTERRUPTED)
     except Exception as error:  # noqa: BLE001 - the outermost frame: no traceback but with --debug
+        if ending.status is not None:  # what was unwound may have raised something of its own
+            sys.exit(ending.status)
         explain(error)
         sys.exit(exit_status(error))
-
-
-def _terminate(number: int, _frame: FrameType | None) -> None:
-    """Leave through every `with`, as Ctrl-C does, so that the processes started are stopped."""
-    sys.exit(128 + number)
 
 
 if __name__ == "__main__":

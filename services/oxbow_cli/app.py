@@ -15,6 +15,7 @@ import typer
 
 from oxbow.bus import DEFAULT_ENDPOINT
 from oxbow_cli.exits import DEBUG
+from oxbow_cli.interrupts import ending
 
 __all__ = ["app"]
 
@@ -183,7 +184,7 @@ def up(
         recordings=recordings_folder(home),
         replicas=replica_counts(replicas or ()),
     )
-    with running_stack(settings):
+    with ending.orderly(), running_stack(settings):
         print("ready:", settings.endpoint, flush=True)
         Lifetime().wait()
 
@@ -275,6 +276,7 @@ def import_site(
     from oxbow.mission import mission_json
     from oxbow_cli.arguments import position
     from oxbow_cli.destination import Destination
+    from oxbow_cli.streams import print_utf8
 
     destination = None if output is None else Destination.of(output, inputs=[site])
     with renamed({DOCUMENT: str(site), f"{DOCUMENT}.type": f"{site}: type"}):
@@ -292,7 +294,7 @@ def import_site(
         print(f"note: {note}", file=sys.stderr)
     document = mission_json(imported.mission)
     if destination is None:
-        print(document.decode(), end="")
+        print_utf8(document)
     else:
         destination.write(document)
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from oxbow.errors import InvalidMission
 from oxbow.files import write_atomically
+from oxbow_cli.interrupts import ending
 
 __all__ = ["Destination", "writing"]
 
@@ -52,7 +53,7 @@ class Destination:
 
     def write(self, data: bytes) -> None:
         """Replace the file as a whole, or leave it as it was."""
-        with writing(self.path):
+        with writing(self.path), ending.held():
             write_atomically(self.path, data)
 
     def keep(self, data: bytes) -> None:
@@ -63,6 +64,10 @@ class Destination:
         InvalidMission
             It is kept elsewhere; the error tells why, and where.
         """
+        with ending.held():
+            self._keep(data)
+
+    def _keep(self, data: bytes) -> None:
         try:
             if _digest(self.path) == self.digest:
                 write_atomically(self.path, data)
@@ -87,7 +92,9 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def _same(path: Path, other: Path) -> bool:
-    return path.resolve() == other.resolve() or (path.exists() and other.exists() and path.samefile(other))
+    if path.exists() and other.exists():
+        return path.samefile(other)
+    return os.path.realpath(path) == os.path.realpath(other)
 
 
 def _require_place(path: Path) -> None:

@@ -8,12 +8,10 @@ import traceback
 
 from oxbow.errors import ErrorCode, OxbowError
 
-__all__ = ["DEBUG", "INTERRUPTED", "exit_status", "explain"]
+__all__ = ["DEBUG", "exit_status", "explain"]
 
 DEBUG = "OXBOW_DEBUG"
 """Environment variable that `--debug` sets, for this process and those that it starts."""
-
-INTERRUPTED = 130
 
 _STATUS = {
     ErrorCode.INVALID_MISSION: 2,

@@ -21,6 +21,7 @@ from oxbow.mission import Mission
 from oxbow.pipeline import Call, expected_calls, plan_mission
 from oxbow.plan import PlanOptions
 from oxbow_cli.exits import DEBUG
+from oxbow_cli.interrupts import ending
 from oxbow_cli.local import local_call
 from oxbow_cli.scratch import scratch_folder
 from oxbow_cli.stack import StackSettings, free_endpoint, running_stack
@@ -101,7 +102,7 @@ def plan_embedded(job: Job, recording: Path | None, recordings: Path) -> Planned
     recording
         Where the recording goes; where absent, into the folder `recordings` under the mission's id.
     """
-    with scratch_folder() as scratch:
+    with ending.orderly(), scratch_folder() as scratch:
         settings = StackSettings(endpoint=free_endpoint(), home=scratch, recordings=scratch)
         with running_stack(settings, output=None if DEBUG in os.environ else subprocess.DEVNULL):
             planned = plan_on(job, settings.endpoint).mission
@@ -117,7 +118,8 @@ def _kept_recording(made: Path, target: Path) -> Path | None:
         return None
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        move_into_place(made, target)
+        with ending.held():
+            move_into_place(made, target)
     except OSError as error:
         _log.warning("warning: the recording cannot be kept as %s: %s", target, error.strerror or error)
         return None

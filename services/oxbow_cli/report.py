@@ -17,6 +17,7 @@ from rich.text import Text
 
 from oxbow.contracts import Conformance, Measures, Method, MissionState
 from oxbow.frame import Position
+from oxbow_cli.streams import print_utf8
 
 if TYPE_CHECKING:
     from oxbow.plan import PlanRecord
@@ -48,7 +49,12 @@ def _console() -> Console:
 
 def print_json(document: Any) -> None:
     """Write a document to stdout as indented JSON."""
-    print(msgspec.json.format(msgspec.json.encode(document, enc_hook=os.fspath), indent=2).decode())
+    print_utf8(msgspec.json.format(msgspec.json.encode(document, enc_hook=_path_text), indent=2) + b"\n")
+
+
+def _path_text(path: Path) -> str:
+    """A path, those bytes of it as escapes that are no text."""
+    return os.fspath(path).encode(errors="backslashreplace").decode()
 
 
 @contextmanager

@@ -24,6 +24,7 @@ from oxbow.errors import InvalidMission
 from oxbow.files import write_atomically
 from oxbow.site import Site
 from oxbow_certificate.erosion import eroded
+from oxbow_cli.interrupts import ending
 
 __all__ = [
     "GAP",
@@ -79,7 +80,8 @@ def save_sheet(figure: Figure, path: Path, width_px: int) -> None:
     picture = io.BytesIO()
     metadata = {"Date": None} if kind == "svg" else {}
     figure.savefig(picture, format=kind, dpi=_DPI * width_px / 2000, metadata=metadata)
-    write_atomically(path, picture.getvalue())
+    with ending.held():
+        write_atomically(path, picture.getvalue())
 
 
 def new_sheet(site: Site) -> tuple[Figure, Axes]:

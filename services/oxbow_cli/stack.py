@@ -15,6 +15,7 @@ from oxbow.bus import Bus
 from oxbow.contracts import STAGES
 from oxbow.errors import InvalidMission, Unavailable
 from oxbow_cli.health import PERIOD_S, Health
+from oxbow_cli.interrupts import ending
 from oxbow_cli.supervisor import Child, Supervisor
 
 __all__ = ["SERVICES", "StackSettings", "free_endpoint", "running_stack"]
@@ -77,7 +78,8 @@ def running_stack(settings: StackSettings, output: int | None = None) -> Iterato
         A process ended before it was ready, or was not ready after `START_S`.
     """
     with Supervisor(output) as supervisor:
-        started = _start(supervisor, settings)
+        with ending.held():  # a process that is started is known to the supervisor
+            started = _start(supervisor, settings)
         give_up = time.monotonic() + START_S
         with _connected(settings.endpoint, supervisor, give_up) as bus:
             _wait_ready(bus, started.services, supervisor, give_up)

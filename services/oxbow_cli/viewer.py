@@ -21,9 +21,12 @@ _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
 def find_recording(name: str, folder: Path) -> Path:
     """The recording of a mission's id, or the file itself where `name` is a path to one."""
     path = Path(name) if name.endswith(".rrd") else folder / f"{checked_id(name, where='ID')}.rrd"
-    if path.is_file():
-        return path
-    kept = sorted(file.stem for file in path.parent.glob("*.rrd") if not file.name.startswith("."))
+    try:
+        if path.is_file():
+            return path
+        kept = sorted(file.stem for file in path.parent.glob("*.rrd") if not file.name.startswith("."))
+    except OSError as error:
+        raise InvalidMission(f"cannot be read: {error.strerror}", where=name) from error
     others = f" and {len(kept) - MOST_NAMED} more" if len(kept) > MOST_NAMED else ""
     there = f"; there are {', '.join(kept[:MOST_NAMED])}{others}" if kept else ""
     raise InvalidMission(f"no recording at {path}{there}", where=name)

@@ -61,3 +61,10 @@ def test_what_is_passed_over_is_noted_beside_the_mission_file(oxbow, folder):
     result = oxbow("import", "site.geojson", "--launch", "-43.999,170.001")
     assert json.loads(result.stdout)["SiteName"] == "South Pond"
     assert result.stderr == "note: passed over 1 Point: only polygons are water\n"
+
+
+def test_the_mission_file_is_utf8_on_any_terminal(oxbow, folder):
+    (folder / "site.geojson").write_text(json.dumps(SITE | {"properties": {"name": "Étang 湖"}}))
+    result = oxbow("import", "site.geojson", "--launch", "-43.999,170.001", PYTHONIOENCODING="ascii")
+    assert result.returncode == 0, result.stderr
+    assert json.loads(result.stdout)["SiteName"] == "Étang 湖"
