@@ -14,6 +14,9 @@ from oxbow.waits import MOST_WAIT_S
 
 __all__ = ["Envelope", "StageError"]
 
+MOST_ENVELOPE_BYTES = 2**16
+"""Far more than one takes: it is read on the network thread."""
+
 
 class Envelope(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The attachment of a query to a stage (JSON).
@@ -65,7 +68,9 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     @classmethod
     def decode(cls, data: bytes) -> Envelope:
-        """Read an envelope; `InvalidMission` where the bytes are none."""
+        """Read an envelope; `InvalidMission` where the bytes are none, or too many."""
+        if len(data) > MOST_ENVELOPE_BYTES:
+            raise InvalidMission(f"is {len(data)} bytes; at most {MOST_ENVELOPE_BYTES}", where="attachment")
         return decode_json(data, cls, "attachment")
 
     def remaining_s(self) -> float:

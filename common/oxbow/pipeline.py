@@ -233,9 +233,8 @@ def _path(
     task: Task, member: Member, approach: Approach, decomposition: Decomposition, length_m: float
 ) -> PathPlan:
     options = task.options
-    return task.call(
-        PATH,
-        PathRequest(
+    with renamed({"min_spacing_m": "Minimal_spatial_rate"}):
+        request = PathRequest(
             method=options.method,
             space=approach.space,
             decomposition=decomposition,
@@ -248,9 +247,8 @@ def _path(
             time_limit_s=options.time_limit_s,
             smooth=options.smooth,
             draw=options.draw,
-        ),
-        part=task.part(member),
-    )
+        )
+    return task.call(PATH, request, part=task.part(member))
 
 
 def _certified(task: Task, vehicles: Sequence[VehiclePlan], areas: tuple[Polygon, ...] = ()) -> Certificate:

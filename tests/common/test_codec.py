@@ -14,7 +14,16 @@ from shapely import LineString, MultiPolygon, Point, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from oxbow import codec
-from oxbow.contracts import Cell, ContourRequest, DecomposeRequest, Decomposition, Message, PathPlan
+from oxbow.contracts import (
+    Cell,
+    ContourRequest,
+    DecomposeRequest,
+    Decomposition,
+    FreeSpace,
+    Message,
+    PathPlan,
+    PathRequest,
+)
 from oxbow.errors import InvalidMission
 from oxbow.recording import Layer, discard
 from oxbow_decomposition.service import handle as decompose
@@ -169,3 +178,20 @@ def test_cells_of_another_heading_are_refused() -> None:
     cells = [right["cells"][0] | {"start": 9}, *right["cells"][1:]]
     with pytest.raises(InvalidMission, match=r"cells\[0\]: joins the critical points 9 and"):
         codec.decode(msgspec.msgpack.encode(right | {"cells": cells}), Decomposition)
+
+
+def test_a_spacing_beyond_the_water_is_refused() -> None:
+    free = box(0.0, 0.0, 30.0, 40.0)
+    cells = decompose(DecomposeRequest(free=free, spacing_m=2.0, heading_rad=0.0), discard)
+    space = FreeSpace(free=free, water=free, tolerance_m=0.0, compression=1.0)
+    with pytest.raises(
+        InvalidMission, match="min_spacing_m: is 51 m; expected at most the extent of the water, 50 m"
+    ):
+        PathRequest(
+            space=space,
+            decomposition=cells,
+            launch=(1.0, 1.0),
+            recovery=(1.0, 1.0),
+            length_m=100.0,
+            min_spacing_m=51.0,
+        )

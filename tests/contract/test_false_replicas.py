@@ -119,6 +119,30 @@ def test_a_false_replica_alone_is_named(bus: Bus, false_replica: list[Query]) ->
     assert len(false_replica) == 3
 
 
+def test_a_false_replica_is_not_asked_again_while_a_true_one_is_busy(
+    router: RouterProcess, bus: Bus, call: BusCall
+) -> None:
+    asked: list[str] = []
+
+    def accept(query: Query) -> None:
+        asked.append(query.key)
+        with query:
+            if query.key == ALONE.instance_key("false"):
+                reply(query, FALSE, b"another")
+            elif len(asked) < 6:
+                busy = ErrorReply(code=ErrorCode.BUSY, message="later")
+                query.fail(StageError.about(own(query).decode(), busy))
+            else:
+                reply(query, codec.encode(Echo(text="true", shape=SQUARE, pid=0)), own(query))
+
+    with Bus.connect(router.endpoint) as session, false_replicas(session, bus, accept):
+        session.declare_queryable(ALONE.instance_key("busy"), accept)
+        session.declare_live(ALONE.live_key("busy"))
+        wait_until(lambda: len(bus.instances("alone")) == 2)
+        assert call(ALONE, EchoRequest(shape=SQUARE)).text == "true"
+    assert asked.count(ALONE.instance_key("false")) == 1
+
+
 def test_an_error_of_its_own_reaches_the_caller(router: RouterProcess, bus: Bus, call: BusCall) -> None:
     def accept(query: Query) -> None:
         with query:

@@ -216,6 +216,7 @@ ODD_ATTACHMENTS = [
     (b"\xff\xfe", "attachment: is not JSON"),
     (b'{"request_id":"\xff","deadline_s":1}', "attachment: is not JSON: a string is not UTF-8"),
     (b'{"a":' * 10_000, "attachment: is nested too deeply"),
+    (b"[" * 100_000, "attachment: is 100000 bytes; at most 65536"),
     (b'{"request_id":"a/b","deadline_s":1}', "request_id: is 'a/b'"),
     (b'{"request_id":"r","deadline_s":1e300}', r"deadline_s: is 1e\+300; expected Unix time"),
     (b'{"request_id":"r","deadline_s":1,"mission_id":"@m"}', "mission_id: is '@m'"),

@@ -174,6 +174,7 @@ class _Attempts(Generic[A]):
         self.started = time.monotonic()
         self.tried: dict[str, str] = {}
         self.to_avoid: set[str] = set()
+        self.false: set[str] = set()
         self.failures = 0
         self.pause_s = FIRST_PAUSE_S
 
@@ -242,15 +243,20 @@ class _Attempts(Generic[A]):
 
     def _note_failure(self, instance: str, error: _Failed) -> None:
         self._note(instance, error.outcome)
+        if error.outcome is WRONG:
+            self.false.add(instance)
         self.failures += 1
         if self.failures >= MOST_FAILURES:
             raise Internal(f"{error.message}; given up {self._history()}", where=self.endpoint.stage) from error
 
     def _pause(self) -> None:
-        """Try another replica at once, where there is one; else wait a little and try all of them again."""
+        """Try another replica at once, where there is one; else wait a little and try them again.
+
+        One that gave a wrong answer is asked again only where there is no other.
+        """
         if set(self.bus.instances(self.endpoint.stage)) - self.to_avoid:
             return
-        self.to_avoid.clear()
+        self.to_avoid = set(self.false)
         time.sleep(min(self.pause_s, max(0.0, self.envelope.remaining_s())))
         self.pause_s = min(2 * self.pause_s, LONGEST_PAUSE_S)
 

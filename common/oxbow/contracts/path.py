@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 
 from shapely import LineString, Polygon
 
@@ -19,6 +20,7 @@ from oxbow.contracts.message import (
     require_place,
 )
 from oxbow.contracts.missions import MOST_DEADLINE_S
+from oxbow.errors import InvalidMission
 
 __all__ = ["Draw", "Method", "PathPlan", "PathRequest", "SpacingStep", "WeightedArea"]
 
@@ -79,6 +81,13 @@ class PathRequest(Message, frozen=True, kw_only=True):
         require_finite(self, "length_m", above=0.0, most=MOST_LENGTH_M)
         require_finite(self, "time_limit_s", above=0.0, most=MOST_DEADLINE_S)
         require_finite(self, "min_spacing_m", least=0.0, most=MOST_LENGTH_M)
+        x0, y0, x1, y1 = self.space.free.bounds
+        extent_m = math.hypot(x1 - x0, y1 - y0)
+        if self.min_spacing_m > extent_m:
+            raise InvalidMission(
+                f"is {self.min_spacing_m:g} m; expected at most the extent of the water, {extent_m:.0f} m",
+                where="min_spacing_m",
+            )
         require_finite(self, "seed", least=0, most=MOST_SEED)
         require_place(self, "launch", "recovery")
 
