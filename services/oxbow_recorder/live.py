@@ -35,24 +35,22 @@ class LiveServer(Closing):
             port = _free_port()
         self.address = f"rerun+http://127.0.0.1:{port}/proxy"
         self._command = [sys.executable, "-m", "oxbow_recorder.viewers", str(port), str(os.getpid())]
-        self._process = self._launch()
+        self.process = self._launch()
 
     def revive(self) -> None:
         """Start it again where it has ended, some time after the last start."""
-        if self._process.poll() is not None and time.monotonic() - self._started > PAUSE_S:
-            _log.error(
-                "the server for viewers ended with status %d; it is started again", self._process.returncode
-            )
-            self._process = self._launch()
+        if self.process.poll() is not None and time.monotonic() - self._started > PAUSE_S:
+            _log.error("the server for viewers ended with status %d; it is started again", self.process.returncode)
+            self.process = self._launch()
 
     def close(self) -> None:
         """Serve no more."""
-        self._process.terminate()
+        self.process.terminate()
         try:
-            self._process.wait(END_S)
+            self.process.wait(END_S)
         except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+            self.process.kill()
+            self.process.wait()
 
     def _launch(self) -> subprocess.Popen[bytes]:
         self._started = time.monotonic()

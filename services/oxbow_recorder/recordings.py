@@ -22,6 +22,9 @@ __all__ = ["Recording", "Recordings"]
 FLUSH_S = 5.0
 """How long what is left of a recording may take to be written: where a disk is full, rerun may wait for ever."""
 
+LEAVE_S = 1.0
+"""How long viewers may take to be served what is left; where nobody serves them, rerun takes some seconds more."""
+
 _ABANDONED: list[rr.RecordingStream] = []
 """Streams whose files could not be written: leaving one may wait for ever."""
 
@@ -47,41 +50,61 @@ class Recording:
     def __init__(self, folder: Path, run: Run, viewers: str | None = None) -> None:
         self.path = recording_path(folder, run)
         self._part = part_path(folder, run)
-        self._stream = rr.RecordingStream("oxbow", recording_id=recording_id(run))
+        self._file = rr.RecordingStream("oxbow", recording_id=recording_id(run))
         with self._writing():
             folder.mkdir(parents=True, exist_ok=True)
             self._part.unlink(missing_ok=True)
-            sinks: list[rr.FileSink | rr.GrpcSink] = [rr.FileSink(str(self._part))]
-            if viewers is not None:
-                sinks.append(rr.GrpcSink(viewers))
-            self._stream.set_sinks(*sinks, default_blueprint=blueprint())
-        self._stream.send_recording_name(run.mission_id)
+            self._file.set_sinks(rr.FileSink(str(self._part)), default_blueprint=blueprint())
+        self._streams = [self._file]
+        if viewers is not None:
+            # A stream of its own: that nobody serves viewers must not cost the file.
+            live = rr.RecordingStream("oxbow", recording_id=recording_id(run))
+            live.connect_grpc(viewers, default_blueprint=blueprint())
+            self._streams.append(live)
+        for stream in self._streams:
+            stream.send_recording_name(run.mission_id)
 
     def add(self, stamped: Stamped) -> None:
         """Draw one layer."""
         layer = stamped.layer
         frame = None if stamped.origin is None else Frame(*stamped.origin)
-        self._stream.set_time("time", timestamp=stamped.time_s)
-        self._stream.set_time("step", sequence=layer.step)
-        for drawn in draw(layer, frame, stamped.part):
-            self._stream.log(drawn.entity, drawn.archetype)
+        drawn = tuple(draw(layer, frame, stamped.part))
+        for stream in self._streams:
+            stream.set_time("time", timestamp=stamped.time_s)
+            stream.set_time("step", sequence=layer.step)
+            for each in drawn:
+                stream.log(each.entity, each.archetype)
 
     def finish(self) -> Path:
         """Finish the file and put it in its place."""
-        with self._writing():
-            self._stream.flush(timeout_sec=FLUSH_S)
-            self._stream.disconnect()
-            return self._part.replace(self.path)
+        try:
+            with self._writing():
+                self._file.flush(timeout_sec=FLUSH_S)
+                self._file.disconnect()
+                return self._part.replace(self.path)
+        finally:
+            for live in self._streams[1:]:
+                _leave(live)
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
         try:
             yield
         except (OSError, RuntimeError) as error:  # rerun raises RuntimeError, for a full disk, too
-            _ABANDONED.append(self._stream)
+            _ABANDONED.append(self._file)
             with suppress(OSError):
                 self._part.unlink(missing_ok=True)
             raise Unavailable(f"cannot be written: {error}", where=str(self.path)) from error
+
+
+def _leave(live: rr.RecordingStream) -> None:
+    """Leave the server for viewers, which may be gone."""
+    try:
+        live.flush(timeout_sec=LEAVE_S)
+        live.disconnect()
+    except RuntimeError as error:
+        _ABANDONED.append(live)
+        _log.warning("viewers see no end of a recording: %s", error)
 
 
 class Recordings:
