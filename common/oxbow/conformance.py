@@ -17,11 +17,14 @@ from functools import cached_property
 import numpy as np
 import shapely
 from shapely import LineString, MultiPolygon, Point, Polygon, STRtree
+from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
 from oxbow.arrays import Geometries
 from oxbow.contracts import Fault, FloatArray, Leg, Place, Rule
+from oxbow.narrows import least_basin_m2, without_narrows
 from oxbow.route.gate_routes import Routes
+from oxbow.tolerances import ROUNDING_M
 
 __all__ = ["Conduct", "Shore", "crossings_of"]
 
@@ -36,7 +39,10 @@ SAFETY_SHARE = 0.99
 """The share of the safety distance that must be kept: eroded contours are polygons, not arcs."""
 
 OPEN_SHARE = 2.0
-"""A safe stretch shorter than so many safety distances does not end a leg: it is a wide spot of a creek."""
+"""A safe stretch shorter than so many safety distances does not end a leg, wherever it is."""
+
+LOOK_SHARE = 16.0
+"""So many safety distances of a safe stretch are looked at to tell a basin from a wide spot of a creek."""
 
 DIRECT_SHARE = 3.5
 """A leg of so many safety distances is never too long: straight off the shore, with room to come alongside."""
@@ -89,11 +95,14 @@ class Shore:
         The outline less the forbidden zones.
     safety_m
         The distance that paths keep from its boundary.
+    least_width_m
+        Narrower water is no water to be reached from ashore.
     """
 
-    def __init__(self, water: Polygon | MultiPolygon, safety_m: float) -> None:
+    def __init__(self, water: Polygon | MultiPolygon, safety_m: float, least_width_m: float = 0.0) -> None:
         self.water = water
         self.safety_m = safety_m
+        self.least_width_m = least_width_m
         shapely.prepare(water)
 
     @cached_property
@@ -101,6 +110,11 @@ class Shore:
         """The boundary in runs of a few edges."""
         rings = shapely.get_rings(shapely.get_parts(self.water))
         return STRtree(np.concatenate([_runs_of(shapely.get_coordinates(ring)) for ring in rings]))
+
+    @cached_property
+    def _parts(self) -> Geometries:
+        """The parts of the water that a vehicle fits into."""
+        return shapely.get_parts(without_narrows(self.water, self.least_width_m))
 
     def conduct(self, path: LineString, launch: Place, recovery: Place) -> Conduct:
         """Judge a path from `launch` to `recovery`."""
@@ -111,7 +125,7 @@ class Shore:
         off_m = shapely.distance(
             shapely.points([launch, recovery]), shapely.points(segments.ends[[0, -1], [0, 1]])
         )
-        out_m, home_m = np.where(off_m > SAME_PLACE_M, 0.0, self._leg_lengths(unsafe, total_m)).tolist()
+        out_m, home_m = np.where(off_m > SAME_PLACE_M, 0.0, self._leg_lengths(path, unsafe)).tolist()
         ends = (_End("launch", launch, 0.0, out_m), _End("recovery", recovery, total_m, total_m - home_m))
         legs = [
             self._leg(end, path, _within(outside, *end.stretch), _within(unsafe, *end.stretch)) for end in ends
@@ -150,18 +164,45 @@ class Shore:
             found.append(segments.stretches(parts, first + segment[pair]))
         return _merged(np.vstack(found))
 
-    def _leg_lengths(self, unsafe: FloatArray, total_m: float) -> tuple[float, float]:
+    def _leg_lengths(self, path: LineString, unsafe: FloatArray) -> tuple[float, float]:
         """How far a path's first and its last leg reach; a path that never comes to open water has none."""
-        for open_m in (OPEN_SHARE * self.safety_m, 0.0):
-            out_m, home_m = _reach_m(unsafe, open_m), _reach_m(total_m - unsafe[::-1, ::-1], open_m)
-            if out_m + home_m < total_m:
-                return out_m, home_m
+        out_m = self._reach_m(path, unsafe)
+        home_m = self._reach_m(path.reverse(), path.length - unsafe[::-1, ::-1])
+        if out_m + home_m < path.length:
+            return out_m, home_m
+        ends = unsafe[(unsafe[:, 0] <= ROUNDING_M) | (unsafe[:, 1] >= path.length - ROUNDING_M)]
+        if len(ends) == 2:
+            return float(ends[0, 1]), float(path.length - ends[1, 0])
         return 0.0, 0.0
+
+    def _reach_m(self, path: LineString, unsafe: FloatArray) -> float:
+        """How far the leg at a path's start reaches: to the first safe stretch in a basin."""
+        reach_m = 0.0
+        for start_m, end_m in unsafe.tolist():
+            if start_m - reach_m > OPEN_SHARE * self.safety_m and self._is_basin(path, reach_m, start_m):
+                break
+            reach_m = end_m
+        return reach_m
+
+    def _is_basin(self, path: LineString, start_m: float, end_m: float) -> bool:
+        """Whether a safe stretch of a path lies in a basin, as the planner understands it."""
+        if self.safety_m == 0.0:
+            return True
+        end_m = min(end_m, start_m + LOOK_SHARE * self.safety_m)
+        free = self._free_beside(substring(path, start_m, end_m))
+        nearest = free[np.argmin(shapely.distance(free, path.interpolate((start_m + end_m) / 2)))]
+        return bool(nearest.area >= least_basin_m2(self.safety_m, self.least_width_m))
+
+    def _free_beside(self, way: BaseGeometry) -> Geometries:
+        """The water near a way that is farther from the shore than the safety distance, its parts."""
+        beside = way.buffer(OPEN_SHARE * self.safety_m)
+        near = self._runs.query(beside, predicate="dwithin", distance=self.safety_m)
+        bands = shapely.buffer(self._runs.geometries[near], SAFETY_SHARE * self.safety_m, quad_segs=QUAD_SEGS)
+        return shapely.get_parts(beside.intersection(self.water).difference(shapely.union_all(bands)))
 
     def _leg(self, end: _End, path: LineString, outside: FloatArray, unsafe: FloatArray) -> Leg:
         """A leg, and what its place makes necessary."""
-        parts = shapely.get_parts(self.water)
-        water = parts[np.argmin(shapely.distance(parts, path.interpolate(end.open_m)))]
+        water = self._parts[np.argmin(shapely.distance(self._parts, path.interpolate(end.open_m)))]
         unsafe_m, ashore_m = _length_m(unsafe), float(water.distance(Point(end.place)))
         direct_m = DIRECT_SHARE * self.safety_m + DETOUR * ashore_m
         return Leg(
@@ -176,15 +217,14 @@ class Shore:
 
         Open water is where the leg ends, and what it passes on its way there.
         """
-        beside = substring(path, *end.stretch).buffer(OPEN_SHARE * self.safety_m)
-        parts = shapely.get_parts(beside.intersection(self.water))
+        way = substring(path, *end.stretch)
+        parts = shapely.get_parts(way.buffer(OPEN_SHARE * self.safety_m).intersection(self.water))
         water = parts[np.argmin(shapely.distance(parts, Point(end.place)))]
         start = shapely.get_coordinates(shapely.shortest_line(water, Point(end.place)))[0]
-        near = self._runs.query(beside, predicate="dwithin", distance=self.safety_m)
-        bands = shapely.buffer(self._runs.geometries[near], SAFETY_SHARE * self.safety_m, quad_segs=QUAD_SEGS)
-        free = shapely.get_parts(water.difference(shapely.union_all(bands)))
-        basins = free[shapely.area(free) >= (OPEN_SHARE * self.safety_m) ** 2]
-        goal = shapely.union_all([*basins, path.interpolate(end.open_m).buffer(self.safety_m).intersection(water)])
+        free = self._free_beside(way)
+        basins = free[shapely.area(free) >= least_basin_m2(self.safety_m, self.least_width_m)]
+        open_end = path.interpolate(end.open_m).buffer(self.safety_m)
+        goal = shapely.union_all([*basins, open_end]).intersection(water)
         if goal.is_empty or goal.covers(Point(start)):
             return 0.0
         routes = Routes(water, self.safety_m)
@@ -320,13 +360,3 @@ def _within(stretches: FloatArray, start_m: float, end_m: float) -> FloatArray:
 
 def _length_m(stretches: FloatArray) -> float:
     return float((stretches[:, 1] - stretches[:, 0]).sum())
-
-
-def _reach_m(stretches: FloatArray, open_m: float) -> float:
-    """How far stretches reach from a path's start without an open one of `open_m` between them."""
-    reach_m = 0.0
-    for start_m, end_m in stretches.tolist():
-        if start_m - reach_m > open_m:
-            break
-        reach_m = end_m
-    return reach_m

@@ -69,7 +69,7 @@ class Task:
     @cached_property
     def shore(self) -> Shore:
         """What paths are judged by before they leave."""
-        return Shore(self.site.water, self.mission.safety_m)
+        return Shore(self.site.water, self.mission.safety_m, self.mission.least_width_m)
 
     def part(self, member: Member) -> str:
         """Which part of the mission a vehicle is, where there are several."""
@@ -262,6 +262,7 @@ def _certified(task: Task, vehicles: Sequence[VehiclePlan], areas: tuple[Polygon
             outline=task.site.outline,
             zones=task.site.zones,
             safety_m=task.mission.safety_m,
+            least_width_m=task.mission.least_width_m,
             variogram=task.mission.variogram,
             areas=areas,
             danger_zones=task.site.danger_zones,

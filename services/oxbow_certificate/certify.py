@@ -62,7 +62,8 @@ def judge(request: CertifyRequest) -> Judgement:
     cover = cover_radius(space.judged, distance)
     spread = distance_spread(space.judged, distance)
     least_m = least_radius(space.judged.area, paths.length, len(lines))
-    shore, danger = Shore(space.water, request.safety_m), Danger(request.danger_zones)
+    shore = Shore(space.water, request.safety_m, request.least_width_m)
+    danger = Danger(request.danger_zones)
     conducts = [shore.conduct(track.path, track.launch, track.recovery) for track in request.tracks]
     tracks = tuple(
         _conformance(track, conduct, danger) for track, conduct in zip(request.tracks, conducts, strict=True)

@@ -9,6 +9,7 @@ from shapely import MultiLineString, MultiPolygon, Polygon
 
 from oxbow.contracts import CertifyRequest
 from oxbow.errors import Infeasible
+from oxbow.narrows import without_narrows
 from oxbow_certificate.cover import least_radius
 from oxbow_certificate.erosion import eroded, polygons
 
@@ -27,7 +28,7 @@ class JudgedSpace:
     water
         The outline less the forbidden zones.
     free
-        The water eroded by the safety distance: its connected parts.
+        The water, but for narrows, eroded by the safety distance: its connected parts.
     asked
         What is to be covered: all of `free`, or those of the request's areas that lie in it.
     judged
@@ -58,7 +59,7 @@ class JudgedSpace:
         if water.is_empty:
             raise Infeasible("cover the whole outline; expected some water between them", where="zones")
         detail_m = _detail(water, request)
-        parts = polygons(eroded(water, request.safety_m, detail_m))
+        parts = polygons(eroded(without_narrows(water, request.least_width_m), request.safety_m, detail_m))
         if not parts:
             raise Infeasible(
                 f"is {request.safety_m:g} m, which leaves no water; expected less than {_inradius(water):g} m",

@@ -160,6 +160,7 @@ def _request(mission: Mission, site: Site, paths: list[_Path]) -> CertifyRequest
         outline=site.outline,
         zones=site.zones,
         safety_m=mission.safety_m,
+        least_width_m=mission.least_width_m,
         variogram=mission.variogram,
         areas=tuple(spot.area for spot in site.hot_spots) if treats else (),
         danger_zones=site.danger_zones,

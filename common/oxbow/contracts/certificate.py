@@ -77,13 +77,14 @@ class CertifyRequest(Track, frozen=True, kw_only=True):
     """A path to judge against the mission itself: the true outline and zones, not the planner's free space.
 
     The paths of a team are judged together: `others` are those of its further vehicles. `areas` are what the paths
-    are to cover where that is not all of the free space: the hot spots of a treatment. The probability of harm is
-    told where there are `danger_zones`.
+    are to cover where that is not all of the free space: the hot spots of a treatment. Water narrower than
+    `least_width_m` is not to be covered. The probability of harm is told where there are `danger_zones`.
     """
 
     outline: Polygon
     zones: tuple[Polygon, ...] = ()
     safety_m: float = 0.0
+    least_width_m: float = 0.0
     variogram: Variogram | None = None
     others: tuple[Track, ...] = ()
     areas: tuple[Polygon, ...] = ()
@@ -92,7 +93,7 @@ class CertifyRequest(Track, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_area(self, "outline", "zones", "areas")
-        require_finite(self, "safety_m", least=0.0, most=FARTHEST_M)
+        require_finite(self, "safety_m", "least_width_m", least=0.0, most=FARTHEST_M)
 
     @property
     def tracks(self) -> tuple[Track, ...]:
