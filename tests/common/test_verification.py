@@ -86,11 +86,7 @@ FALSE = {
         "contour",
     ),
     "cells of another lake": (
-        {
-            DECOMPOSE.stage: lambda _, r: replace(
-                r, cells=tuple(replace(c, floor=c.floor + 300.0, ceiling=c.ceiling + 300.0) for c in r.cells)
-            )
-        },
+        {DECOMPOSE.stage: lambda q, _: local_call()(DECOMPOSE, replace(q, free=moved(q.free, 300.0)))},
         "decomposition",
     ),
     "path of another launch": ({PATH.stage: lambda _, r: replace(r, path=moved(r.path, 30.0))}, "path"),
