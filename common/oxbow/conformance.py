@@ -22,7 +22,7 @@ from shapely.ops import substring
 
 from oxbow.arrays import Geometries
 from oxbow.contracts import Fault, FloatArray, Leg, Place, Rule
-from oxbow.narrows import least_basin_m2, without_narrows
+from oxbow.narrows import is_basin, without_narrows
 from oxbow.route.gate_routes import Routes
 from oxbow.tolerances import ROUNDING_M
 
@@ -41,7 +41,7 @@ SAFETY_SHARE = 0.99
 OPEN_SHARE = 2.0
 """A safe stretch shorter than so many safety distances does not end a leg, wherever it is."""
 
-LOOK_SHARE = 16.0
+LOOK_SHARE = 4.0
 """So many safety distances of a safe stretch are looked at to tell a basin from a wide spot of a creek."""
 
 DIRECT_SHARE = 3.5
@@ -191,7 +191,7 @@ class Shore:
         end_m = min(end_m, start_m + LOOK_SHARE * self.safety_m)
         free = self._free_beside(substring(path, start_m, end_m))
         nearest = free[np.argmin(shapely.distance(free, path.interpolate((start_m + end_m) / 2)))]
-        return bool(nearest.area >= least_basin_m2(self.safety_m, self.least_width_m))
+        return is_basin(nearest, self.safety_m, self.least_width_m)
 
     def _free_beside(self, way: BaseGeometry) -> Geometries:
         """The water near a way that is farther from the shore than the safety distance, its parts."""
@@ -222,7 +222,7 @@ class Shore:
         water = parts[np.argmin(shapely.distance(parts, Point(end.place)))]
         start = shapely.get_coordinates(shapely.shortest_line(water, Point(end.place)))[0]
         free = self._free_beside(way)
-        basins = free[shapely.area(free) >= least_basin_m2(self.safety_m, self.least_width_m)]
+        basins = [part for part in free if is_basin(part, self.safety_m, self.least_width_m)]
         open_end = path.interpolate(end.open_m).buffer(self.safety_m)
         goal = shapely.union_all([*basins, open_end]).intersection(water)
         if goal.is_empty or goal.covers(Point(start)):
