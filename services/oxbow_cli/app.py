@@ -174,6 +174,7 @@ def up(
 
     from oxbow.lifetime import Lifetime
     from oxbow_cli.arguments import endpoint, replica_counts
+    from oxbow_cli.destination import writing
     from oxbow_cli.home import home_folder, recordings_folder
     from oxbow_cli.stack import StackSettings, running_stack
 
@@ -184,6 +185,8 @@ def up(
         recordings=recordings_folder(home),
         replicas=replica_counts(replicas or ()),
     )
+    with writing(settings.home):
+        settings.home.mkdir(parents=True, exist_ok=True)
     with ending.orderly(), running_stack(settings):
         print("ready:", settings.endpoint, flush=True)
         Lifetime().wait()

@@ -99,17 +99,18 @@ def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     with named_as_given():
         judgement = judge(request)
     unit = Unit.of(mission, judgement, treats=bool(request.areas))
-    figure, axes = sheet.new_sheet(site)
-    sheet.draw_site(axes, site, mission.safety_m)
-    _draw_gaps(axes, judgement, unit)
-    _note_worst_gap(axes, judgement, unit)
-    sheet.draw_ends(axes, site)
-    sheet.draw_scale_and_north(axes)
-    _draw_magnified(figure, axes, site, judgement, unit, mission.safety_m)
-    _draw_key(figure, unit)
     figures = _treated_figures(judgement, unit) if request.areas else _figures(judgement)
-    sheet.draw_header(figure, f"Gaps of {mission.site_name or 'the path'}", figures)
-    sheet.save_sheet(figure, path, width_px)
+    with sheet.lettering():
+        figure, axes = sheet.new_sheet(site)
+        sheet.draw_site(axes, site, mission.safety_m)
+        _draw_gaps(axes, judgement, unit)
+        _note_worst_gap(axes, judgement, unit)
+        sheet.draw_ends(axes, site)
+        sheet.draw_scale_and_north(axes)
+        _draw_magnified(figure, axes, site, judgement, unit, mission.safety_m)
+        _draw_key(figure, unit)
+        sheet.draw_header(figure, f"Gaps of {mission.site_name or 'the path'}", figures)
+        sheet.save_sheet(figure, path, width_px)
 
 
 def _draw_gaps(axes: Axes, judgement: Judgement, unit: Unit) -> None:

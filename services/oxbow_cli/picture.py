@@ -54,7 +54,11 @@ def draw(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
         The suffix is none of the two, the width is not positive, or the site is not valid.
     """
     sheet.checked_format(path, width_px)
-    site = Site.of(mission)
+    with sheet.lettering():
+        _draw(mission, Site.of(mission), path, width_px)
+
+
+def _draw(mission: Mission, site: Site, path: Path, width_px: int) -> None:
     figure, axes = sheet.new_sheet(site)
     sheet.draw_site(axes, site, mission.safety_m)
     for spot in site.hot_spots:

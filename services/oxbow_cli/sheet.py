@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import io
+import logging
 import math
+import re
+import warnings
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import shapely
-from matplotlib import patheffects
+from matplotlib import font_manager, patheffects, rc_context, rcParams
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.patches import Polygon as PolygonPatch
 from matplotlib.path import Path as Outline
+from matplotlib.text import Text
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -40,6 +45,7 @@ __all__ = [
     "draw_header",
     "draw_scale_and_north",
     "draw_site",
+    "lettering",
     "line_width",
     "new_sheet",
     "note",
@@ -56,6 +62,24 @@ _DPI = 200
 _HEADER_IN, _FOOTER_IN = 0.85, 0.75
 _TOGETHER_M = 1.0
 """Ends of paths that are no farther apart are drawn as one."""
+_HEADER_END = 0.94
+"""Where the arrow to the north begins, as a share of the sheet's width."""
+_SMALLEST_PT = 8.0
+_MOST_CHARACTERS = 400
+_FALLBACK_FONTS = (
+    "Noto Sans",
+    "Noto Sans CJK SC",
+    "Noto Sans CJK JP",
+    "Noto Sans Arabic",
+    "Noto Sans Devanagari",
+    "Droid Sans Fallback",
+    "WenQuanYi Zen Hei",
+    "Microsoft YaHei",
+    "Hiragino Sans",
+    "Arial Unicode MS",
+)
+_MISSING_GLYPH = re.compile(r"Glyph (\d+) .* missing from ")
+_log = logging.getLogger(__name__)
 _HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
 
 
@@ -243,10 +267,45 @@ def add_key(figure: Figure, left: float, width: float, cmap: str | Colormap) -> 
 
 
 def draw_header(figure: Figure, title: str, figures: str) -> None:
-    """The site's name, and a line of figures below it."""
+    """The site's name, and a line of figures below it; what is too long for the sheet is smaller, then cut."""
     top = 1 - 0.38 / figure.get_figheight()
-    figure.text(0.04, top, title, fontsize=15, weight="bold", color=INK, parse_math=False)
-    figure.text(0.04, top - 0.27 / figure.get_figheight(), figures, fontsize=9.5, color=INK, parse_math=False)
+    title = " ".join(title.split())
+    named = figure.text(0.04, top, title, fontsize=15, weight="bold", color=INK, parse_math=False)
+    below = top - 0.27 / figure.get_figheight()
+    told = figure.text(0.04, below, figures, fontsize=9.5, color=INK, parse_math=False)
+    for text in (named, told):
+        _fit(figure, text)
+
+
+def _fit(figure: Figure, text: Text) -> None:
+    """Keep a line of the header off the arrow to the north."""
+    room = (_HEADER_END - text.get_position()[0]) * figure.get_window_extent().width
+    whole, shown = text.get_text(), _MOST_CHARACTERS
+    if len(whole) > shown:
+        text.set_text(f"{whole[:shown]}…")
+    if (width := text.get_window_extent().width) > room:
+        text.set_fontsize(max(float(text.get_fontsize()) * room / width, _SMALLEST_PT))
+    while (width := text.get_window_extent().width) > room and shown > 1:
+        shown = max(1, int(min(shown, len(text.get_text()) - 1) * room / width))
+        text.set_text(f"{whole[:shown].rstrip()}…")
+
+
+@contextmanager
+def lettering() -> Iterator[None]:
+    """Within, names are written in the fonts here that have their characters; others are boxes, which is said."""
+    installed = set(font_manager.get_font_names())
+    families = [*rcParams["font.sans-serif"][:1], *(name for name in _FALLBACK_FONTS if name in installed)]
+    with warnings.catch_warnings(record=True) as caught, rc_context({"font.family": families}):
+        warnings.simplefilter("always")
+        yield
+    missing = set()
+    for warning in caught:
+        if match := _MISSING_GLYPH.match(str(warning.message)):
+            missing.add(chr(int(match[1])))
+        else:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+    if missing:
+        _log.warning("note: no font here has %s: drawn as boxes", "".join(sorted(missing)))
 
 
 def _round_down(length_m: float) -> float:

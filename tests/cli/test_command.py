@@ -144,3 +144,8 @@ def test_an_input_is_not_overwritten(oxbow, folder):
     assert oxbow("picture", "pond.svg", "-o", "pond.svg").returncode == 2
     assert oxbow("import", "pond.svg", "--launch", "1,2", "-o", "pond.svg").returncode == 2
     assert (folder / "pond.svg").read_bytes() == before
+
+
+def test_a_home_that_is_no_folder_is_told_before_anything_is_started(oxbow):
+    result = oxbow("up", "--home", "pond.json")
+    assert (result.returncode, result.stderr) == (2, "error: pond.json: cannot be written: File exists\n")

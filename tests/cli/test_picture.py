@@ -100,6 +100,29 @@ def test_labels_cover_the_place_where_they_are_written():
     assert 0 < north - south < 0.2 * (east - west)
 
 
+@pytest.mark.parametrize(
+    "name", ["Lake", "A lake of a very long name, " * 4, "A lake without an end, " * 400, "W\n" * 99]
+)
+def test_a_name_keeps_off_the_arrow_to_the_north(name):
+    figure, _ = sheet.new_sheet(Site.of(SITE))
+    sheet.draw_header(figure, name, f"figures of {name}")
+    arrow = 0.945 * figure.get_window_extent().width
+    title, figures = figure.texts
+    assert title.get_window_extent().x1 < arrow
+    assert figures.get_window_extent().x1 < arrow
+    assert title.get_text().startswith(name[:1])
+    assert (title.get_text() == "Lake") is (name == "Lake")
+    assert "\n" not in title.get_text()
+
+
+def test_characters_that_no_font_has_are_said_in_one_line(tmp_path, caplog):
+    named = msgspec.structs.replace(SITE, site_name="Lake \U0001f6a4\U0001f6a5 \U000f0000")
+    draw(named, tmp_path / "plan.png", width_px=300)
+    (record,) = caplog.records
+    assert "no font here has" in record.getMessage()
+    assert "\U000f0000" in record.getMessage()
+
+
 def test_gaps_need_a_path(tmp_path):
     with pytest.raises(InvalidMission, match="oxbow plan"):
         draw_gaps(SITE, tmp_path / "gaps.png")
