@@ -248,6 +248,7 @@ def test_progress_never_runs_backwards():
         OPTIONS,
         60.0,
         lambda *step: heard.append(step),
+        lambda _mission: None,
     )
     plan_here(job)
     assert all(before < after for (_, before), (_, after) in pairwise(heard))

@@ -107,7 +107,7 @@ def test_a_mutated_message_is_one_or_is_refused(exchanges: list[Exchange]) -> No
 def test_a_stage_plans_a_mutated_request_or_says_what_is_wrong(exchanges: list[Exchange]) -> None:
     chance = random.Random(2)
     call, planned = local_call(), 0
-    for _ in range(200):
+    for _ in range(120):
         exchange = chance.choice([each for each in exchanges if each.endpoint.stage in CHEAP])
         try:
             request = codec.decode(mutated(exchange.request, chance), exchange.endpoint.request)
@@ -115,4 +115,4 @@ def test_a_stage_plans_a_mutated_request_or_says_what_is_wrong(exchanges: list[E
         except (InvalidMission, Infeasible):
             continue
         planned += 1
-    assert planned > 20
+    assert planned > 12

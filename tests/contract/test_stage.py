@@ -212,7 +212,7 @@ def test_what_is_too_large_is_refused_by_size(start_replicas: StartReplicas, cal
 
 
 ODD_ATTACHMENTS = [
-    (b"", "attachment: is not JSON"),
+    (b"", "attachment: is empty; expected JSON"),
     (b"\xff\xfe", "attachment: is not JSON"),
     (b'{"request_id":"\xff","deadline_s":1}', "attachment: is not JSON: a string is not UTF-8"),
     (b'{"a":' * 10_000, "attachment: is nested too deeply"),
