@@ -122,6 +122,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
         self._closed = False
         self._links = bus.links
         self._due_s = 0.0
+        self._is_behind = False
         # Before what is kept is asked for, so that nothing is missed between the two.
         self._subscription = bus.subscribe(str(key), lambda *sample: self._live.put(sample))
         try:
@@ -181,7 +182,9 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
     # ----------------------------------------------------------------- catching up
 
     def _is_due(self) -> bool:
-        return self._links != self._bus.links or time.monotonic() >= self._due_s
+        if self._links != self._bus.links:
+            self._links, self._due_s = self._bus.links, 0.0
+        return time.monotonic() >= self._due_s
 
     def _first_catch_up(self) -> None:
         give_up = time.monotonic() + ANSWER_S
@@ -199,18 +202,18 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
         try:
             self._catch_up()
         except OxbowError as error:
-            _log.warning("%s: cannot ask what is kept: %s", self._key, error)
-            self._due_s = time.monotonic() + LOOK_S
+            if not self._is_behind:
+                _log.warning("%s: cannot ask what is kept, until later: %s", self._key, error)
+            self._is_behind, self._due_s = True, time.monotonic() + LOOK_S
 
     def _catch_up(self) -> None:
         """Fetch what was not heard of."""
-        links = self._bus.links
         for status in self._statuses():
             mission_id, last = status.mission_id, _last_of(status)
             if last > max(self._seen.get(mission_id, 0), self._asked.get(mission_id, 0)):
                 self._fetch(mission_id)
                 self._asked[mission_id] = last
-        self._links, self._due_s = links, time.monotonic() + CATCH_UP_S
+        self._is_behind, self._due_s = False, time.monotonic() + CATCH_UP_S
 
     def _fetch(self, mission_id: str) -> None:
         """Have what is kept of a mission beyond what was seen come next, by rising revision."""
