@@ -12,6 +12,7 @@ from shapely import LineString
 from oxbow.contracts import Method, PathPlan, PathRequest
 from oxbow.recording import Show
 from oxbow_path.conformance import require_conforming
+from oxbow_path.course import best_plan
 from oxbow_path.dropped import dropped_parts
 from oxbow_path.refinement import Polyline, smoothed
 from oxbow_path.ring import space_filling_curve
@@ -29,6 +30,9 @@ METHODS: dict[Method, PathMethod] = {
     Method.WATERSHED: watershed,
 }
 
+WIDEST = 2.0
+"""No plan claims a wider spacing than so many nominal ones: what it leaves farther away is named as dropped."""
+
 ACCEPTED = 0.95
 """Share of the longest length below which a plan says why it does not use more (report: 5 %)."""
 
@@ -37,16 +41,17 @@ def handle(request: PathRequest, show: Show) -> PathPlan:
     """Plan a path by the requested method, check it, and show how it came about."""
     task = Task.of(request, _stop(request.time_limit_s))
     display = Display(show, request.decomposition.heading_rad)
-    plan = METHODS[request.method](task, display)
+    plan = best_plan(METHODS[request.method], task, display)
+    claimed_m = min(plan.spacing_m, WIDEST * task.spacing_m)
     found = _smoothed(plan.path, task) if request.smooth else plan.path
     display.lines("path", [found])
     path = _from_launch_to_recovery(shapely.transform(found, display.back), request)
     require_conforming(path, request)
     return PathPlan(
         path=path,
-        spacing_m=plan.spacing_m,
+        spacing_m=claimed_m,
         steps=plan.steps,
-        dropped=dropped_parts(path, request.space.free, plan.reach_m),
+        dropped=dropped_parts(path, request.space.free, plan.reach_m * claimed_m / plan.spacing_m),
         warnings=tuple(_length_warnings(plan, task)),
     )
 

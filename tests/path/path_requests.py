@@ -9,6 +9,7 @@ from shapely import Polygon
 from oxbow.contracts import ContourRequest, DecomposeRequest, Method, PathRequest, Place
 from oxbow.errors import renamed
 from oxbow.recording import discard
+from oxbow.spacing import nominal_spacing_m
 from oxbow_contour.service import handle as contour
 from oxbow_decomposition.service import handle as decompose
 
@@ -46,7 +47,7 @@ def request(
     """A request for some water: `spacings` is the length, and `safety` the distance, over the root of the area."""
     scale_m = math.sqrt(water.area)
     length_m = spacings * scale_m
-    spacing_m = water.area / length_m
+    spacing_m = nominal_spacing_m(water.area, length_m)
     launch = launch or water.exterior.coords[0]
     outline, zones = Polygon(water.exterior), tuple(Polygon(ring) for ring in water.interiors)
     asked = ContourRequest(

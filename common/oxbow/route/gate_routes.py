@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 import shapely
 from scipy.sparse import csr_array
-from shapely import LineString, MultiPolygon, Polygon
+from shapely import LineString, MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import Indices
@@ -45,8 +45,13 @@ class Routes:
         self.detail_m = detail_m
 
     @cached_property
+    def mesh(self) -> Mesh:
+        """The water in triangles, its shore in edges no longer than the detail."""
+        return Mesh.of(self.water, detail_m=self.detail_m)
+
+    @cached_property
     def _gates(self) -> Gates:
-        return Gates(Mesh.of(self.water, detail_m=self.detail_m))
+        return Gates(self.mesh)
 
     @cached_property
     def _graph(self) -> csr_array[np.float64]:
@@ -57,6 +62,15 @@ class Routes:
         shapely.prepare(area)
         inside = shapely.contains_xy(area, self._gates.places)
         return np.flatnonzero(inside & (self._gates.mesh.twins >= 0))
+
+    @cached_property
+    def _middles(self) -> STRtree:
+        return STRtree(np.asarray(shapely.points(self._gates.places)))
+
+    def goals_near(self, line: LineString, distance_m: float) -> Indices:
+        """The gates whose middles lie no farther from a line."""
+        near = np.sort(self._middles.query(line, predicate="dwithin", distance=distance_m))
+        return np.asarray(near[self._gates.mesh.twins[near] >= 0])
 
     def to_area(self, start: FloatArray, area: BaseGeometry, goals: Indices) -> LineString | None:
         """The shortest route from a point of the water into an area; None if none leads there.

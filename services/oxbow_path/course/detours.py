@@ -1,0 +1,168 @@
+"""Detours: out from a path to the water that it leaves far away, and back beside the way out.
+
+A walk round a tree grows its region; a course from one place to another has none. A detour needs the path alone:
+where a narrow strip of water is crossed by the path once, the path may go round the strip's end as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+from shapely import LineString, Point, Polygon
+from shapely.ops import substring
+
+from oxbow.arrays import Indices
+from oxbow.contracts import FloatArray
+from oxbow.tolerances import ROUNDING_M
+from oxbow_path.walk.region import largest
+from oxbow_path.walk.trial import Waters
+
+__all__ = ["detoured", "with_detours"]
+
+HALF_WIDTH = 0.12
+"""Half width of a detour at first, in spacings: narrow, so that it parts the water that it runs into."""
+
+SHORT_OF = 0.25
+"""A detour ends so far from the place that it is made for, in spacings."""
+
+NARROWINGS = 4
+"""How often a strip's width is halved until the path crosses it once."""
+
+ROUNDS = 6
+
+MOST_AT_ONCE = 400
+"""Of the places far from the path, so many are looked at in one round."""
+
+LEAST_SHARE = 0.002
+"""A length left that is less than this share of the spacing is not worth a detour."""
+
+QUAD_SEGS = 2
+"""Strips have ends of few corners: every corner is a waypoint."""
+
+
+def with_detours(path: LineString, waters: Waters, most_m: float, *, reach_m: float) -> LineString:
+    """The path with detours to the places farthest from it, as far as the length goes.
+
+    Parameters
+    ----------
+    path
+        Simple, and inside the free space but for its legs.
+    waters
+        The water and its probe.
+    most_m
+        How long the path may become.
+    reach_m
+        Places nearer than this are near enough.
+    """
+    for _ in range(ROUNDS):
+        before_m = path.length
+        for gap in _gaps(path, waters, most_m - before_m, reach_m):
+            left_m = most_m - path.length
+            if left_m < LEAST_SHARE * waters.spacing_m:
+                return path
+            path = detoured(path, waters, gap, left_m) or path
+        if path.length - before_m < LEAST_SHARE * waters.spacing_m:
+            break
+    return path
+
+
+def _gaps(path: LineString, waters: Waters, left_m: float, reach_m: float) -> Iterator[FloatArray]:
+    """Places farther from the path than the reach: as many, evenly apart, as the length left serves."""
+    points, distance_m = waters.probe.points, waters.probe.distances(path)
+    far = np.flatnonzero(distance_m > reach_m)
+    apart_m = waters.spacing_m
+    while True:
+        chosen = _spread(points[far], distance_m[far], apart_m)
+        if len(chosen) < 2 or 2.0 * distance_m[far][chosen].sum() <= max(left_m, 0.0):
+            break
+        apart_m *= 1.5
+    return iter(points[far][chosen][:MOST_AT_ONCE])
+
+
+def _spread(points: FloatArray, distance_m: FloatArray, apart_m: float) -> Indices:
+    """Indices of points at least `apart_m` from one another, those farthest from the path first."""
+    taken, chosen = np.zeros(len(points), dtype=bool), []
+    index = cKDTree(points) if len(points) else None
+    for number in np.argsort(-distance_m, kind="stable").tolist():
+        if index is not None and not taken[number]:
+            taken[index.query_ball_point(points[number], apart_m)] = True
+            chosen.append(number)
+    return np.array(chosen, dtype=np.intp)
+
+
+def detoured(
+    path: LineString, waters: Waters, gap: FloatArray, left_m: float, *, short_of: float = SHORT_OF
+) -> LineString | None:
+    """The path with one detour towards a place, no longer by more than `left_m`; None where none fits."""
+    out = _way_out(path, waters, gap)
+    half_width_m = HALF_WIDTH * waters.spacing_m
+    for _ in range(NARROWINGS):
+        length_m = min(out.length - short_of * waters.spacing_m, (left_m - 2 * half_width_m) / 2)
+        if length_m > half_width_m:
+            longer = _round(path, _end_of(out, length_m), waters, half_width_m)
+            if longer is not None and longer.length - path.length <= left_m:
+                return longer
+        half_width_m /= 2
+    return None
+
+
+def _way_out(path: LineString, waters: Waters, gap: FloatArray) -> LineString:
+    """From the path to a place: straight where the water allows it, else along the middle of the water."""
+    straight = LineString(shapely.get_coordinates(shapely.shortest_line(path, Point(gap))))
+    if shapely.covers(waters.passable.free_and_rounding, straight):
+        return straight
+    goals = waters.routes.goals_near(path, HALF_WIDTH * waters.spacing_m)
+    way = waters.routes.to_area(gap, path, goals)
+    if way is None:
+        return straight
+    met = shapely.get_coordinates(way.intersection(path))
+    end_m = min((way.project(Point(place)) for place in met), default=way.length)
+    way = _part(way, 0.0, end_m) if end_m > ROUNDING_M else way
+    onto = shapely.get_coordinates(shapely.shortest_line(Point(way.coords[-1]), path))[1]
+    return LineString(np.vstack([onto, shapely.get_coordinates(way)[::-1]]))
+
+
+def _end_of(out: LineString, length_m: float) -> LineString:
+    return _part(out, 0.0, length_m)
+
+
+def _part(line: LineString, start_m: float, end_m: float) -> LineString:
+    part = substring(line, start_m, end_m)
+    return part if isinstance(part, LineString) else line
+
+
+def _round(path: LineString, out: LineString, waters: Waters, half_width_m: float) -> LineString | None:
+    """The path led round a strip along a line that starts on it; None where it crosses the strip repeatedly."""
+    strip = largest(out.buffer(half_width_m, quad_segs=QUAD_SEGS).intersection(waters.free))
+    if strip.is_empty or strip.interiors:
+        return None
+    crossed = shapely.line_merge(path.intersection(strip))
+    if not isinstance(crossed, LineString) or crossed.length < ROUNDING_M:
+        return None
+    start_m, end_m = sorted(path.project(shapely.points(crossed.coords[i])) for i in (0, -1))
+    if end_m - start_m > crossed.length + ROUNDING_M:
+        # The strip holds the path's two ends, which are one place.
+        return None
+    head, tail = (shapely.get_coordinates(_part(path, *ends)) for ends in ((0.0, start_m), (end_m, path.length)))
+    longer = LineString(np.vstack([head, _way_round(strip, head[-1], tail[0]), tail]))
+    longer = shapely.remove_repeated_points(longer, ROUNDING_M)
+    return longer if longer.is_simple else None
+
+
+def _way_round(strip: Polygon, start: FloatArray, end: FloatArray) -> FloatArray:
+    """The longer way along a strip's border from one of its places to another, without the two."""
+    ring = LineString(strip.exterior)
+    first_m, last_m = sorted(ring.project(Point(place)) for place in (start, end))
+    between = shapely.get_coordinates(_part(ring, first_m, last_m))
+    around = np.vstack(
+        [
+            shapely.get_coordinates(_part(ring, last_m, ring.length)),
+            shapely.get_coordinates(_part(ring, 0.0, first_m)) if first_m > 0.0 else between[:0],
+        ]
+    )
+    way = between if last_m - first_m >= ring.length / 2 else around
+    is_forward = np.hypot(*(way[0] - start)) <= np.hypot(*(way[-1] - start))
+    return way if is_forward else way[::-1]

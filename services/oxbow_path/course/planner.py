@@ -1,0 +1,148 @@
+"""Which course to follow: the method's own path, the shortest way with detours, or a loop round islands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import shapely
+from shapely import LineString, Polygon
+
+from oxbow.contracts import SpacingStep
+from oxbow.errors import Infeasible, Internal
+from oxbow.route import RouteMethod, make_router
+from oxbow.tolerances import ROUNDING_M
+from oxbow_path.course.detours import detoured, with_detours
+from oxbow_path.course.loops import Middles
+from oxbow_path.improvement import improved
+from oxbow_path.refinement import Polyline
+from oxbow_path.task import Display, MethodPlan, PathMethod, Task
+from oxbow_path.walk.legs import joined
+from oxbow_path.walk.trial import CUT
+
+__all__ = ["best_plan"]
+
+WAYS = 4.0
+"""A walk from launch to recovery goes there, back and there: below so many shortest ways, one way is tried."""
+
+REACH = 0.5
+"""Water nearer to the course than this, in spacings, needs no detour."""
+
+EVENNESS_QUANTILE = 0.95
+
+
+def best_plan(method: PathMethod, task: Task, display: Display) -> MethodPlan:
+    """The plan of a method, or along a course where that leaves less water far away.
+
+    Raises
+    ------
+    Infeasible
+        Even the shortest way from launch to recovery is longer than the vehicle can go.
+    """
+    courses = list(_courses(task))
+    fitting = [course for course in courses if task.budget.fits(course.length)]
+    plans = []
+    try:
+        plans.append(method(task, display))
+    except Infeasible as refusal:
+        if not fitting:
+            raise _too_short(task, courses) or refusal from None
+    if fitting and not (plans and task.stop()):
+        plans.append(_along(fitting, task, display))
+    return min(plans, key=lambda plan: _score_m(plan.path, task))
+
+
+def _too_short(task: Task, courses: Sequence[LineString]) -> Infeasible | None:
+    """The refusal with the true figure: a course is shorter than any walk from one place to another."""
+    if not courses:
+        return None
+    shortest_m = min(course.length for course in courses)
+    return Infeasible(
+        f"is {task.request.length_m:.0f} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
+        "Master_length",
+    )
+
+
+def _along(courses: Sequence[LineString], task: Task, display: Display) -> MethodPlan:
+    """The best of some courses with detours, refined."""
+    waters = task.waters
+    longer = [
+        with_detours(course, waters, task.useful_length_m, reach_m=REACH * task.spacing_m) for course in courses
+    ]
+    best = min(longer, key=lambda course: _score_m(course, task))
+    display.lines("course", [best])
+    path = improved(Polyline.of(best, waters.passable.free_and_rounding), task, display)
+    steps = (SpacingStep(spacing_m=task.spacing_m, length_m=best.length),)
+    return MethodPlan(path, task.spacing_m, task.spacing_m, steps)
+
+
+def _score_m(path: LineString, task: Task) -> float:
+    """How far the water is from a path, the worst of it and nearly all of it: what the refinement makes small."""
+    distance_m = task.waters.probe.distances(path)
+    return float(distance_m.max() + np.quantile(distance_m, EVENNESS_QUANTILE))
+
+
+def _courses(task: Task) -> Iterator[LineString]:
+    """Courses from launch to recovery that a walk round a tree cannot make."""
+    waters = task.waters
+    if waters.launch.place != waters.recovery.place:
+        way = _shortest_way(task)
+        if task.budget.limit_m < WAYS * way.length and way.is_simple:
+            yield way
+    elif waters.free.interiors:
+        yield from _loops(task)
+
+
+def _shortest_way(task: Task) -> LineString:
+    """From launch to recovery, with their legs."""
+    waters = task.waters
+    router = make_router(RouteMethod.FUNNEL, waters.free)
+    ends = (shapely.get_coordinates(entry)[0] for entry in waters.entries)
+    way = router.route(*ends).polyline
+    whole = np.vstack([waters.launch.leg[:-1], way, waters.recovery.leg[-2::-1]])
+    return LineString(shapely.get_coordinates(shapely.remove_repeated_points(LineString(whole), ROUNDING_M)))
+
+
+def _loops(task: Task) -> Iterator[LineString]:
+    """Loops round islands, from the launch point and back."""
+    waters = task.waters
+    for loop in Middles.of(waters.routes.mesh).loops(task.spacing_m, task.budget.most_m):
+        course = _from_home(LineString(loop), task)
+        if course is not None:
+            yield course
+
+
+def _from_home(loop: LineString, task: Task) -> LineString | None:
+    """A loop that begins and ends at the launch point; None where no way leads there, or the legs do not fit."""
+    waters = task.waters
+    home = waters.launch.entry
+    sight = shapely.shortest_line(home, loop)
+    if not shapely.covers(waters.passable.free_and_rounding, sight):
+        away = loop.project(home) + loop.length / 2
+        turned = _turned(loop, away % loop.length)
+        found = detoured(
+            turned, waters, shapely.get_coordinates(home)[0], task.budget.most_m - loop.length, short_of=0.0
+        )
+        if found is None:
+            return None
+        loop = found
+    try:
+        return joined(
+            Polygon(loop),
+            waters.launch,
+            waters.recovery,
+            waters.passable,
+            opening_m=CUT * waters.spacing_m,
+            detail_m=waters.spacing_m,
+        )
+    except (Infeasible, Internal):
+        return None
+
+
+def _turned(loop: LineString, start_m: float) -> LineString:
+    """A closed line that starts elsewhere."""
+    points = shapely.get_coordinates(loop)
+    at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    first = int(np.searchsorted(at, start_m)) % (len(points) - 1)
+    turned = np.roll(points[:-1], -first, axis=0)
+    return LineString(np.vstack([turned, turned[:1]]))

@@ -1,0 +1,103 @@
+"""Courses: any length from the shortest way on, and loops round islands."""
+
+import numpy as np
+import pytest
+import shapely
+from path_requests import lake, request
+from shapely import LineString, Point, affinity, box
+
+from oxbow.contracts import Method, PathPlan, PathRequest
+from oxbow.errors import Infeasible
+from oxbow.recording import discard
+from oxbow.route.mesh import Mesh
+from oxbow_path.course.loops import Middles
+from oxbow_path.service import handle
+from oxbow_path.walk.probe import Probe
+
+
+def require_sound(plan: PathPlan, asked: PathRequest, least_share: float = 0.95) -> None:
+    """Simple, inside, from launch to recovery, and as long as may be; what it leaves far away is named."""
+    path = plan.path
+    assert path.is_simple
+    assert (path.coords[0], path.coords[-1]) == (asked.launch, asked.recovery)
+    assert least_share * asked.length_m <= path.length <= asked.length_m
+    assert path.difference(asked.space.free.buffer(1e-6)).length <= 1e-6
+    named = shapely.union_all([part.outline for part in plan.dropped])
+    unseen = asked.space.free.difference(path.buffer(2 * plan.spacing_m)).difference(named.buffer(1e-6))
+    assert unseen.area <= 0.1 * (2 * plan.spacing_m) ** 2
+
+
+def farthest_m(plan: PathPlan, asked: PathRequest) -> float:
+    return float(Probe.over(asked.space.free, plan.spacing_m / 4).distances(plan.path).max())
+
+
+@pytest.mark.parametrize(("method", "share"), [(Method.TRANSECT, 1.02), (Method.SPACE_FILLING_CURVE, 1.6)])
+def test_one_way_through_a_canal(method, share):
+    canal = affinity.rotate(box(0, 0, 1000, 20), 30.0, origin=(0, 0))
+    (launch, recovery) = shapely.get_coordinates(affinity.rotate(LineString([(10, 10), (990, 10)]), 30, (0, 0)))
+    asked = request(
+        canal,
+        spacings=share * 980 / np.sqrt(canal.area),
+        launch=tuple(launch),
+        recovery=tuple(recovery),
+        method=method,
+    )
+    plan = handle(asked, discard)
+    require_sound(plan, asked)
+    assert farthest_m(plan, asked) <= 16.0
+
+
+def test_a_way_that_is_too_long_is_told_as_long_as_it_is():
+    canal = box(0, 0, 1000, 20)
+    asked = request(canal, spacings=6.5, launch=(10, 10), recovery=(990, 10))
+    with pytest.raises(Infeasible, match="the shortest path from launch to recovery is 980 m"):
+        handle(asked, discard)
+
+
+@pytest.mark.parametrize("method", [Method.TRANSECT, Method.SPACE_FILLING_CURVE])
+def test_a_short_trip_from_home_on_a_large_lake(method):
+    water = box(0, 0, 4000, 3000)
+    asked = request(water, spacings=0.3, safety=0.001, launch=(10, 10), method=method)
+    plan = handle(asked, discard)
+    require_sound(plan, asked)
+    assert plan.dropped
+
+
+@pytest.mark.parametrize(("method", "laps"), [(Method.TRANSECT, 1.1), (Method.SPACE_FILLING_CURVE, 1.6)])
+def test_once_round_a_moat_closes(method, laps):
+    moat = box(0, 0, 300, 200).difference(box(12, 12, 288, 188))
+    round_m = 2 * (288 + 188)
+    asked = request(
+        moat, spacings=laps * round_m / np.sqrt(moat.area), safety=0.02, launch=(6, 100), method=method
+    )
+    plan = handle(asked, discard)
+    require_sound(plan, asked)
+    assert farthest_m(plan, asked) <= 9.0
+
+
+def test_half_a_moat_is_named():
+    moat = box(0, 0, 300, 200).difference(box(12, 12, 288, 188))
+    asked = request(moat, spacings=0.5 * 952 / np.sqrt(moat.area), safety=0.02, launch=(6, 100))
+    plan = handle(asked, discard)
+    require_sound(plan, asked)
+    assert sum(part.area_m2 for part in plan.dropped) >= 0.3 * asked.space.free.area
+
+
+def test_a_loop_round_a_chain_of_islands_holds_them_all():
+    islands = [box(x, 10, x + 80, 90) for x in (10, 100, 190)]
+    water = box(0, 0, 280, 100).difference(shapely.union_all(islands))
+    loops = list(Middles.of(Mesh.of(water, detail_m=5.0)).loops(10.0, 1e4))
+    assert all(shapely.Polygon(loops[-1]).contains(island) for island in islands)
+    assert loops[-1].length == pytest.approx(2 * (270 + 90), rel=0.05)
+    assert not list(Middles.of(Mesh.of(water, detail_m=5.0)).loops(2.0, 1e4))
+    assert not list(Middles.of(Mesh.of(water, detail_m=5.0)).loops(10.0, 100.0))
+
+
+def test_a_ragged_lake_one_way_at_any_length():
+    water = lake(3)
+    west, east = (Point(xy) for xy in ((-400, 0), (400, 0)))
+    ends = [shapely.get_coordinates(shapely.shortest_line(water.buffer(-30), end))[0] for end in (west, east)]
+    for share in (1.1, 2.0):
+        spacings = share * 800 / np.sqrt(water.area)
+        asked = request(water, spacings=spacings, launch=tuple(ends[0]), recovery=tuple(ends[1]))
+        require_sound(handle(asked, discard), asked)
