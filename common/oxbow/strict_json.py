@@ -76,9 +76,7 @@ def decode_json(data: bytes, kind: type[T], name: str, *, at: str = "") -> T:
         error tells the field with its index, its value and what would be accepted).
     """
     try:
-        return msgspec.json.decode(data, type=kind)
-    except msgspec.ValidationError as error:
-        raise _mistyped(str(error), data, kind, name, at) from error
+        return _decoded(data, kind, name, at)
     except msgspec.DecodeError as error:
         if not data.strip():
             raise InvalidMission("is empty; expected JSON", where=name) from error
@@ -87,6 +85,15 @@ def decode_json(data: bytes, kind: type[T], name: str, *, at: str = "") -> T:
         raise InvalidMission("is not JSON: a string is not UTF-8", where=name) from error
     except RecursionError as error:
         raise InvalidMission("is nested too deeply to be read", where=name) from error
+
+
+def _decoded(data: bytes, kind: type[T], name: str, at: str) -> T:
+    try:
+        return msgspec.json.decode(data, type=kind)
+    except msgspec.ValidationError as error:
+        # What is no JSON further on is said first: no field of it can be told.
+        msgspec.json.decode(data, type=msgspec.Raw)
+        raise _mistyped(str(error), data, kind, name, at) from error
 
 
 def gathered(document: dict[str, msgspec.Raw], known: frozenset[str]) -> dict[str, msgspec.Raw]:
@@ -156,13 +163,17 @@ def _steps(path: str) -> Iterator[re.Match[str]]:
 def _text_at(path: str, data: bytes) -> str:
     """The JSON text of the value that stands at `path`, shortened."""
     raw = msgspec.Raw(data)
-    for step in _steps(path):
-        if step["any"]:
-            break
-        if step["key"]:
-            raw = msgspec.json.decode(raw, type=dict[str, msgspec.Raw])[step["key"]]
-        else:
-            raw = msgspec.json.decode(raw, type=list[msgspec.Raw])[int(step["index"])]
+    try:
+        for step in _steps(path):
+            if step["any"]:
+                break
+            if step["key"]:
+                raw = msgspec.json.decode(raw, type=dict[str, msgspec.Raw])[step["key"]]
+            else:
+                raw = msgspec.json.decode(raw, type=list[msgspec.Raw])[int(step["index"])]
+    except (KeyError, IndexError, msgspec.ValidationError):
+        # A name that occurs twice: the decoder met the first, and the dictionary holds the last.
+        return "given twice"
     text = " ".join(bytes(raw).decode("utf-8", "replace").split())
     return text if len(text) <= 60 else f"{text[:57]}..."
 
