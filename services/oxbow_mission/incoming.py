@@ -79,7 +79,7 @@ class QueriedPlan(QueriedRequest):
 
     def accept(self, checked: Checked) -> None:
         until = self.since + checked.deadline_s + GRACE_S
-        waiter = Waiter(self.query, checked.client, until)
+        waiter = Waiter(self.query, checked.client, until, self.size)
         status = _accepted(self.registry, checked)
         final = self.registry.when_final(status, lambda revision: self.waiters.add(revision, waiter))
         if final.state.is_final:

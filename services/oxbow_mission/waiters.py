@@ -12,20 +12,25 @@ from oxbow.bus.query import Query
 from oxbow.contracts import PLAN_KEY, MissionStatus
 from oxbow.errors import Busy, DeadlineExceeded, ErrorReply, OxbowError
 from oxbow_mission.store import Revision, Store
+from oxbow_mission.wire import STAGE
 
 __all__ = ["Waiter", "Waiters"]
 
 MOST_PER_CLIENT = 256
 MOST = 4096
+MOST_BYTES_PER_CLIENT = 2**28
+MOST_BYTES = 2**29
+"""A query that waits holds its payload."""
 
 
 @dataclass(frozen=True)
 class Waiter:
-    """A query, whose it is, and until when (`time.monotonic`) its asker may still be there."""
+    """A query, whose it is, until when (`time.monotonic`) its asker may be there, and the bytes of its payload."""
 
     query: Query
     client: str
     until: float
+    size: int
 
     def answer(self, store: Store, status: MissionStatus) -> None:
         """Answer by the plan of a revision that is final, or by why there is none."""
@@ -48,26 +53,30 @@ class Waiters:
         self._lock = threading.Lock()
         self._waiting: defaultdict[Revision, list[Waiter]] = defaultdict(list)
         self._counts: Counter[str] = Counter()
+        self._bytes: Counter[str] = Counter()
 
     def add(self, revision: Revision, waiter: Waiter) -> None:
         """Have a query wait; `Busy` where too many do."""
         with self._lock:
             own, every = self._counts[waiter.client], self._counts.total()
+            own_bytes, every_bytes = self._bytes[waiter.client], self._bytes.total()
             if own >= MOST_PER_CLIENT or every >= MOST:
-                raise Busy(
-                    f"{own} queries of this client and {every} in all wait for plans; expected fewer than"
-                    f" {MOST_PER_CLIENT} and {MOST}: the mission is kept, ask again later",
-                    where="mission",
+                raise _busy(
+                    f"{own} queries of this client and {every}", f"fewer than {MOST_PER_CLIENT} and {MOST}"
+                )
+            if own and (own_bytes + waiter.size > MOST_BYTES_PER_CLIENT or every_bytes + waiter.size > MOST_BYTES):
+                raise _busy(
+                    f"queries of {own_bytes} bytes of this client and {every_bytes}",
+                    f"at most {MOST_BYTES_PER_CLIENT} and {MOST_BYTES}",
                 )
             self._waiting[revision].append(waiter)
             self._counts[waiter.client] += 1
+            self._bytes[waiter.client] += waiter.size
 
     def take(self, revision: Revision) -> list[Waiter]:
         """Those who wait for a revision; they do so no longer."""
         with self._lock:
-            taken = self._waiting.pop(revision, [])
-            self._counts.subtract(waiter.client for waiter in taken)
-            return taken
+            return self._forget(self._waiting.pop(revision, []))
 
     def let_go(self, gone: Collection[str]) -> int:
         """Let go whose client is gone or whose time is up; return how many these were."""
@@ -78,7 +87,7 @@ class Waiters:
             with waiter.query:
                 pass
         for waiter in late:
-            waiter.fail(DeadlineExceeded("no plan yet; the mission is kept, ask again", where="mission"))
+            waiter.fail(DeadlineExceeded("no plan yet; the mission is kept, ask again", where=STAGE))
         return len(left) + len(late)
 
     def _take_if(self, is_meant: Callable[[Waiter], bool]) -> list[Waiter]:
@@ -90,6 +99,18 @@ class Waiters:
                 self._waiting[revision] = [waiter for waiter in waiters if waiter not in meant]
                 if not self._waiting[revision]:
                     del self._waiting[revision]
-            self._counts.subtract(waiter.client for waiter in taken)
-            self._counts = +self._counts
-            return taken
+            return self._forget(taken)
+
+    def _forget(self, taken: list[Waiter]) -> list[Waiter]:
+        for waiter in taken:
+            self._counts[waiter.client] -= 1
+            self._bytes[waiter.client] -= waiter.size
+            if not self._counts[waiter.client]:
+                del self._counts[waiter.client], self._bytes[waiter.client]
+        return taken
+
+
+def _busy(waiting: str, accepted: str) -> Busy:
+    return Busy(
+        f"{waiting} in all wait for plans; expected {accepted}: the mission is kept, ask again later", where=STAGE
+    )

@@ -273,12 +273,11 @@ def test_what_is_done_stays_done_and_what_is_unknown_is_said_to_be(client: Clien
 
 def test_another_clients_mission_does_not_wait_behind_those_of_one(client: Client, router: str) -> None:
     with Client(router, timeout_s=WAIT_S) as other:
-        receipts = [client.submit(mission_file(), mission_id=f"slow-{number}", seed=400) for number in range(5)]
+        receipts = [client.submit(mission_file(), mission_id=f"slow-{number}", seed=3000) for number in range(4)]
         other.plan(mission_file(), mission_id="quick", seed=1)
-        done = sum(client.status(receipt.mission_id).state is MissionState.DONE for receipt in receipts)
-        assert done <= 3
-        for receipt in receipts:
-            client.plan(mission_file(), mission_id=receipt.mission_id, seed=400)
+        # The slow ones sleep, so they are not all done however busy the machine is.
+        statuses = [client.cancel(receipt.mission_id) for receipt in receipts]
+    assert MissionState.FAILED in {status.state for status in statuses}
 
 
 def test_queries_of_a_client_that_left_hold_nothing(client: Client, router: str) -> None:
