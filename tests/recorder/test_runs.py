@@ -66,6 +66,11 @@ class Clock:
         return self.now_s
 
 
+def pass_time(runs, clock):
+    clock.now_s += 0.1
+    runs.tick()
+
+
 @pytest.fixture
 def clock():
     return Clock()
@@ -179,32 +184,31 @@ def test_a_writer_that_dies_or_stops_costs_what_it_had_not_finished(runs, tmp_pa
     until(lambda: runs.tick() or runs.counts().open == 0)
     show(runs, "next")
     end(runs, "next")
-    clock.now_s += runs_module.AFTER_FAILURE_S + 1.0
-    until(lambda: runs.tick() or (tmp_path / "next.rrd").exists())
+    until(lambda: pass_time(runs, clock) or (tmp_path / "next.rrd").exists())
     assert "a writer failed" in caplog.text
 
 
 def test_a_full_disk_is_named_and_costs_neither_older_recordings_nor_later_ones(
-    runs, tmp_path, monkeypatch, caplog, capfd
+    tmp_path, clock, monkeypatch, caplog, capfd
 ):
     """The size of the files that the writer may write is limited, which rerun meets as a full disk."""
     monkeypatch.setattr("oxbow_recorder.writer.STUCK_S", 3.0)
-    end(runs, "older")
-    until((tmp_path / "older.rrd").exists)
-    before = (tmp_path / "older.rrd").read_bytes()
-    (writer,) = writers()
-    unlimited = writer.rlimit(psutil.RLIMIT_FSIZE)
-    writer.rlimit(psutil.RLIMIT_FSIZE, (20_000, unlimited[1]))
-    end(runs, "older", "r2")
-    end(runs, "lost")
-    until(lambda: runs.tick() or not runs.is_busy())
-    errors = caplog.text + capfd.readouterr().err
-    assert str(tmp_path) in errors
-    if writer.is_running():
-        writer.rlimit(psutil.RLIMIT_FSIZE, unlimited)
-    end(runs, "later")
-    until(lambda: runs.tick() or (tmp_path / "later.rrd").exists())
-    assert (tmp_path / "older.rrd").read_bytes() == before
+    with Runs(tmp_path, clock=clock) as runs:
+        end(runs, "older")
+        until((tmp_path / "older.rrd").exists)
+        before = (tmp_path / "older.rrd").read_bytes()
+        (writer,) = writers()
+        unlimited = writer.rlimit(psutil.RLIMIT_FSIZE)
+        writer.rlimit(psutil.RLIMIT_FSIZE, (20_000, unlimited[1]))
+        end(runs, "older", "r2")
+        end(runs, "lost")
+        until(lambda: runs.tick() or not runs.is_busy())
+        assert str(tmp_path) in caplog.text + capfd.readouterr().err
+        with suppress(psutil.NoSuchProcess):  # killed, where rerun waited for the file
+            writer.rlimit(psutil.RLIMIT_FSIZE, unlimited)
+        end(runs, "later")
+        until(lambda: pass_time(runs, clock) or (tmp_path / "later.rrd").exists())
+        assert (tmp_path / "older.rrd").read_bytes() == before
 
 
 def test_a_layer_that_cannot_be_drawn_costs_that_layer_alone(runs, tmp_path):
