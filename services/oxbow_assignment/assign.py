@@ -21,7 +21,7 @@ from oxbow_assignment.exchange import exchanged
 from oxbow_assignment.insertion import inserted, traded, trimmed
 from oxbow_assignment.matching import match
 from oxbow_assignment.ordering import EXACT_MOST, best_path, exact_path
-from oxbow_assignment.problem import Problem
+from oxbow_assignment.problem import COST, Problem
 from oxbow_assignment.pseudo_coordinates import PseudoCoordinates, pseudo_coordinates
 
 __all__ = ["ClusterMethod", "Clustered", "Clustering", "assign", "cluster_paths", "mended"]
@@ -113,7 +113,7 @@ def assign(problem: Problem, clustering: Clustering | None = None) -> Clustered:
     if not len(targets):
         idle = [problem.path(vehicle, ()) for vehicle in range(len(problem.vehicles))]
         return Clustered(assignment_of(problem, idle), targets, None, np.empty(0, dtype=np.intp), 0.0)
-    coordinates = pseudo_coordinates(problem.finite[np.ix_(targets, targets)])
+    coordinates = pseudo_coordinates(problem.mean_costs[np.ix_(targets, targets)])
     found = (
         _by_clusters(problem, targets, coordinates, clusters)
         for clusters in _clusterings(problem, coordinates, clustering)
@@ -134,7 +134,11 @@ def cluster_paths(problem: Problem, targets: Indices, clusters: Clusters, owners
     """Each vehicle's path through its own clusters, as far as its range allows: all that the report does."""
     own = owners[clusters.labels]
     return [
-        trimmed(problem, vehicle, best_path(problem.finite, problem.path(vehicle, targets[own == vehicle])))
+        trimmed(
+            problem,
+            vehicle,
+            best_path(problem.figures[COST, vehicle], problem.path(vehicle, targets[own == vehicle])),
+        )
         for vehicle in range(len(problem.vehicles))
     ]
 
@@ -153,15 +157,16 @@ def mended(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> l
         paths = exchanged(problem, inserted(problem, paths, held), held)
         traded_paths = traded(problem, paths, held)
         if all(path is before for path, before in zip(traded_paths, paths, strict=True)):
-            return [_exact(problem, path, kept) for path, kept in zip(paths, held, strict=True)]
+            return [_exact(problem, vehicle, path, held[vehicle]) for vehicle, path in enumerate(paths)]
         paths = traded_paths
 
 
-def _exact(problem: Problem, path: Indices, held: int) -> Indices:
-    """A path in the best order behind its held targets, if it is short enough to find it."""
+def _exact(problem: Problem, vehicle: int, path: Indices, held: int) -> Indices:
+    """A path in the best order behind its held targets, if it has few enough to find it, within its range."""
     if len(path) - held > EXACT_MOST + 2:
         return path
-    return np.concatenate([path[:held], exact_path(problem.finite, path[held:])])
+    best = np.concatenate([path[:held], exact_path(problem.figures[COST, vehicle], path[held:])])
+    return best if problem.is_within_range(vehicle, best) else path
 
 
 def _clusterings(problem: Problem, coordinates: PseudoCoordinates, clustering: Clustering) -> Iterator[Clusters]:

@@ -9,23 +9,23 @@ import numpy as np
 
 from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
-from oxbow_assignment.ordering import path_length
-from oxbow_assignment.problem import Objective, Problem
+from oxbow_assignment.problem import COST, LENGTH, Objective, Problem
 
-__all__ = ["Assignment", "Tour", "Unserved", "assignment_of", "tour_length", "tour_lengths"]
+__all__ = ["Assignment", "Tour", "Unserved", "assignment_of", "tour_figures", "tour_length"]
 
 
 @dataclass(frozen=True)
 class Tour:
     """What one vehicle does: its targets in order, from its start to its recovery.
 
-    A vehicle without targets stays where it is: 0 m.
+    A vehicle without targets stays where it is: 0 m. `cost_s` is its duration and what danger on its way is worth.
     """
 
     vehicle: str
     targets: tuple[int, ...]
     length_m: float
     duration_s: float
+    cost_s: float
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,8 @@ class Assignment:
     @property
     def cost_s(self) -> float:
         """The objective."""
-        return self.makespan_s if self.objective is Objective.MAKESPAN else self.total_duration_s
+        costs = [tour.cost_s for tour in self.tours]
+        return max(costs) if self.objective is Objective.MAKESPAN else sum(costs)
 
     @property
     def rank(self) -> tuple[float, float]:
@@ -87,33 +88,37 @@ class Assignment:
         return -self.value, self.cost_s
 
 
-def tour_length(problem: Problem, path: Indices) -> float:
-    """Metres of one vehicle's path; 0 without targets."""
-    return path_length(problem.finite, path) if len(path) > 2 else 0.0
+def tour_figures(problem: Problem, vehicle: int, path: Indices) -> FloatArray:
+    """Cost and length of one vehicle's path, shape (2,), in metres; 0 without targets."""
+    if len(path) <= 2:
+        return np.zeros(2)
+    return np.asarray(problem.figures[:, vehicle, path[:-1], path[1:]].sum(axis=1))
 
 
-def tour_lengths(problem: Problem, paths: Sequence[Indices]) -> FloatArray:
-    """Metres of each vehicle's path."""
-    return np.array([tour_length(problem, path) for path in paths])
+def tour_length(problem: Problem, vehicle: int, path: Indices) -> float:
+    """Length of one vehicle's path; 0 without targets."""
+    return float(tour_figures(problem, vehicle, path)[LENGTH])
 
 
 def assignment_of(problem: Problem, paths: Sequence[Indices]) -> Assignment:
     """The assignment in which each vehicle goes its path: rows of the distances, start first and recovery last."""
-    lengths = tour_lengths(problem, paths)
+    figures = np.array([tour_figures(problem, vehicle, path) for vehicle, path in enumerate(paths)])
     tours = tuple(
         Tour(
             vehicle=vehicle.name,
             targets=tuple(path[1:-1].tolist()),
-            length_m=float(length_m),
-            duration_s=float(length_m) / vehicle.speed_mps,
+            length_m=float(own[LENGTH]),
+            duration_s=float(own[LENGTH]) / vehicle.speed_mps,
+            cost_s=float(own[COST]) / vehicle.speed_mps,
         )
-        for vehicle, path, length_m in zip(problem.vehicles, paths, lengths, strict=True)
+        for vehicle, path, own in zip(problem.vehicles, paths, figures, strict=True)
     )
-    served = np.array([target for tour in tours for target in tour.targets], dtype=int)
+    # In order: the same targets are worth the same, whoever visits them.
+    served = np.array(sorted(target for tour in tours for target in tour.targets), dtype=int)
     left = np.setdiff1d(np.arange(problem.count), served)
     return Assignment(
         tours=tours,
-        unserved=_unserved(problem, paths, lengths, left),
+        unserved=_unserved(problem, paths, figures[:, LENGTH], left),
         objective=problem.objective,
         value=float(problem.values[served].sum()),
     )
@@ -122,7 +127,8 @@ def assignment_of(problem: Problem, paths: Sequence[Indices]) -> Assignment:
 def _unserved(
     problem: Problem, paths: Sequence[Indices], lengths: FloatArray, left: Indices
 ) -> tuple[Unserved, ...]:
-    detours = np.array([_detours(problem, path, left) for path in paths]).reshape(len(paths), len(left))
+    found = [_detours(problem, vehicle, path, left) for vehicle, path in enumerate(paths)]
+    detours = np.array(found).reshape(len(paths), len(left))
     detours = np.where(problem.has_role[:, left], detours, np.inf)
     return tuple(
         Unserved(target=target, detour_m=float(own.min()), reason=_reason(problem, target, own, lengths))
@@ -130,10 +136,10 @@ def _unserved(
     )
 
 
-def _detours(problem: Problem, path: Indices, targets: Indices) -> FloatArray:
-    """By how much each target would lengthen a path, where it does so least; shape (n,)."""
-    away = problem.distances[np.ix_(targets, path)]
-    known = problem.finite[path[:-1], path[1:]] if len(path) > 2 else np.zeros(1)
+def _detours(problem: Problem, vehicle: int, path: Indices, targets: Indices) -> FloatArray:
+    """By how much each target would lengthen a vehicle's path, where it does so least; shape (n,)."""
+    away = problem.lengths[vehicle][np.ix_(targets, path)]
+    known = problem.figures[LENGTH, vehicle, path[:-1], path[1:]] if len(path) > 2 else np.zeros(1)
     detours: FloatArray = (away[:, :-1] + away[:, 1:] - known).min(axis=1)
     return detours
 

@@ -56,9 +56,7 @@ class Campaign:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What whoever reads the sorties should know."""
-        first = self.schedule.first
-        unlike = () if first is None or first.joint is None or not first.gap.reason else (first.gap.reason,)
-        return (*_leg_warnings(self.fleet), *_outside_warnings(self.treatments), *unlike)
+        return (*_leg_warnings(self.fleet), *_outside_warnings(self.treatments))
 
     def treated_share(self, journeys: Sequence[Journey], swath_m: float) -> tuple[float, ...]:
         """How much of each hot spot's water lies within half a swath of journeys; 0 where there is no water."""
@@ -152,7 +150,7 @@ def _dry(spots: Sequence[HotSpot], found: Sequence[BaseGeometry], free: Polygon)
 
 def _out_of_reach(treatments: Sequence[Treatment], division: Division, fleet: Fleet) -> list[LeftSpot]:
     """One entry for each hot spot with stretches that no sortie reaches."""
-    counted = ", what danger is worth included" if fleet.danger.zones else ""
+    counted = ", round danger zones where that is worth it" if fleet.danger.outlines else ""
     left = []
     for number, treatment in enumerate(treatments):
         own = [stretch for stretch in division.out_of_reach if stretch.part.treatment == number]

@@ -35,6 +35,8 @@ class Part:
     ----------
     treatment
         The index of the treatment.
+    spot
+        The name of its hot spot.
     since, until
         Where on the treatment's line it begins and ends, as shares of its length.
     line
@@ -44,6 +46,7 @@ class Part:
     """
 
     treatment: int
+    spot: str
     since: float
     until: float
     line: LineString
@@ -81,7 +84,7 @@ def divided(treatments: Sequence[Treatment], fleet: Fleet) -> Division:
     A part fits where its length and the way to it and home do, either way round on average. One that does not fit
     is divided evenly into as many as its distance asks for, and so on. On a line the way there and home changes by
     no more than twice what is travelled: where even that leaves nothing within reach, nothing is divided further.
-    Danger changes that way by more, where a zone begins or ends: there, short stretches are tried as well.
+    Where routes go round danger that way changes by more: there, short stretches are tried as well.
 
     Raises
     ------
@@ -89,17 +92,18 @@ def divided(treatments: Sequence[Treatment], fleet: Fleet) -> Division:
         It would take hundreds of sorties.
     """
     pieces = [
-        Part(number, 0.0, 1.0, treatment.line, treatment.spot.value) for number, treatment in enumerate(treatments)
+        Part(number, treatment.spot.name, 0.0, 1.0, treatment.line, treatment.spot.value)
+        for number, treatment in enumerate(treatments)
     ]
     parts: list[Part] = []
     out_of_reach: list[OutOfReach] = []
     while pieces:
-        ways = fleet.ways([piece.line for piece in pieces])
+        ways = fleet.ways([piece.line for piece in pieces], [piece.spot for piece in pieces])
         spare = fleet.lengths_m[:, None] - ways.access_m
         longer: list[Part] = []
         for piece, length_m, own in zip(pieces, ways.lengths_m.tolist(), spare.T, strict=True):
             slave = int(own.argmax())
-            is_far = own[slave] + length_m < 0.0 and not fleet.danger.zones
+            is_far = own[slave] + length_m < 0.0 and not fleet.danger.outlines
             if length_m <= own[slave]:
                 parts.append(piece)
             elif is_far or length_m <= LEAST_PART * fleet.lengths_m[slave]:
@@ -125,6 +129,7 @@ def _evenly(piece: Part, count: int) -> list[Part]:
     return [
         Part(
             treatment=piece.treatment,
+            spot=piece.spot,
             since=piece.since + since * (piece.until - piece.since),
             until=piece.since + until * (piece.until - piece.since),
             line=_stretch(piece.line, since, until),

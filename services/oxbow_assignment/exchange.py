@@ -17,7 +17,7 @@ from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow_assignment.layout import Layout
 from oxbow_assignment.ordering import LEAST_GAIN, SEGMENT, improved_path
-from oxbow_assignment.problem import Problem
+from oxbow_assignment.problem import COST, Problem
 
 __all__ = ["exchanged", "in_order"]
 
@@ -35,7 +35,7 @@ def exchanged(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -
     held
         How many leading targets of each path stay in front.
     """
-    paths = [in_order(problem, path, kept) for path, kept in zip(paths, held, strict=True)]
+    paths = [in_order(problem, vehicle, path, held[vehicle]) for vehicle, path in enumerate(paths)]
     near = _near(problem)
     while True:
         layout = Layout.of(problem, paths, held)
@@ -44,17 +44,18 @@ def exchanged(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -
         if not changed:
             return paths
         for vehicle, path in changed.items():
-            paths[vehicle] = in_order(problem, path, held[vehicle])
+            paths[vehicle] = in_order(problem, vehicle, path, held[vehicle])
 
 
-def in_order(problem: Problem, path: Indices, held: int) -> Indices:
-    """A path improved behind its held targets."""
-    return np.concatenate([path[:held], improved_path(problem.finite, path[held:])])
+def in_order(problem: Problem, vehicle: int, path: Indices, held: int) -> Indices:
+    """A vehicle's path improved behind its held targets; as it is, where the better one is beyond its range."""
+    better = np.concatenate([path[:held], improved_path(problem.figures[COST, vehicle], path[held:])])
+    return better if problem.is_within_range(vehicle, better) else path
 
 
 def _near(problem: Problem) -> Indices:
     """The nearest targets of every target and of every start, shape (n + v, k)."""
-    away = problem.finite[: problem.count + len(problem.vehicles), : problem.count].copy()
+    away = problem.mean_costs[: problem.count + len(problem.vehicles), : problem.count].copy()
     away[np.diag_indices(problem.count)] = np.inf
     k = min(NEAR, problem.count)
     return np.argsort(away, axis=1, kind="stable")[:, :k]
@@ -72,7 +73,8 @@ class _Moves:
 
 def _best_apart(kinds: Sequence[_Moves], layout: Layout) -> dict[int, Indices]:
     """The paths that the best moves make, each on tours that no better one has touched."""
-    least = LEAST_GAIN * float(layout.problem.strain(layout.lengths_m, np.arange(len(layout.lengths_m))).sum())
+    costs_m = layout.totals[COST]
+    least = LEAST_GAIN * float(layout.problem.strain(costs_m, np.arange(len(costs_m))).sum())
     gains = np.concatenate([moves.gains for moves in kinds])
     origin = np.concatenate([np.full(len(moves.gains), kind) for kind, moves in enumerate(kinds)])
     index = np.concatenate([np.arange(len(moves.gains)) for moves in kinds])
@@ -87,7 +89,7 @@ def _best_apart(kinds: Sequence[_Moves], layout: Layout) -> dict[int, Indices]:
 
 def _relocations(layout: Layout, near: Indices, length: int) -> _Moves:
     """Move a segment of `length` targets, either way round, next to a near target or to a tour's front."""
-    rows, metres = layout.rows, layout.problem.finite
+    rows, figures = layout.rows, layout.problem.figures
     at = np.flatnonzero(layout.is_free[: len(rows) - length + 1] & layout.is_free[length - 1 :])
     at = at[layout.tour[at] == layout.tour[at + length - 1]]
     joins = layout.place[np.concatenate([near[rows[at]], near[rows[at + length - 1]]], axis=1)]
@@ -98,33 +100,30 @@ def _relocations(layout: Layout, near: Indices, length: int) -> _Moves:
     at, edges = at[keep], edges[keep]
     end = at + length - 1
     giver, taker = layout.tour[at], layout.tour[edges]
-    inside_m = layout.along_m[end] - layout.along_m[at]
-    given_m = (
-        layout.lengths_m[giver]
-        - (layout.along_m[end + 1] - layout.along_m[at - 1])
-        + layout.joint_m(at - 1, end + 1)
-    )
+    given = layout.totals[:, giver] - layout.between(giver, at - 1, end + 1) + layout.joint(at - 1, end + 1)
     before, after, first, last = rows[edges], rows[edges + 1], rows[at], rows[end]
-    kept_m = metres[before, first] + metres[last, after]
-    turned_m = metres[before, last] + metres[first, after]
-    taken_m = layout.lengths_m[taker] - layout.edge_m[edges] + inside_m + np.minimum(kept_m, turned_m)
+    kept = figures[:, taker, before, first] + figures[:, taker, last, after]
+    turned = figures[:, taker, before, last] + figures[:, taker, first, after]
+    is_turned = turned[COST] < kept[COST]
+    inside = layout.between(taker, at, end)
+    taken = layout.totals[:, taker] - layout.edge[:, edges] + inside + np.where(is_turned, turned, kept)
     allowed = np.logical_and.reduce([layout.problem.has_role[taker, rows[at + i]] for i in range(length)])
 
     def paths(index: int) -> dict[int, Indices]:
         one, other, place = int(giver[index]), int(taker[index]), int(at[index])
-        moved = rows[place : place + length][:: -1 if turned_m[index] < kept_m[index] else 1]
+        moved = rows[place : place + length][:: -1 if is_turned[index] else 1]
         inner = place - layout.firsts[one]
         return {
             one: np.delete(layout.paths[one], slice(inner, inner + length)),
             other: np.insert(layout.paths[other], edges[index] - layout.firsts[other] + 1, moved),
         }
 
-    return _Moves(layout.gains(giver, given_m, taker, taken_m, allowed), giver, taker, paths)
+    return _Moves(layout.gains(giver, given, taker, taken, allowed), giver, taker, paths)
 
 
 def _swaps(layout: Layout, near: Indices) -> _Moves:
     """Let two near targets of different tours take each other's place."""
-    rows, metres = layout.rows, layout.problem.finite
+    rows, figures = layout.rows, layout.problem.figures
     at = np.flatnonzero(layout.is_free)
     with_ = layout.place[near[rows[at]]]
     at, with_ = np.repeat(at, with_.shape[1]), with_.ravel()
@@ -132,21 +131,21 @@ def _swaps(layout: Layout, near: Indices) -> _Moves:
     at, with_ = at[keep], with_[keep]
     one, other = layout.tour[at], layout.tour[with_]
 
-    def length(here: Indices, target: Indices) -> FloatArray:
-        left, right = rows[here - 1], rows[here + 1]
-        changed: FloatArray = metres[left, target] + metres[target, right] - layout.edge_m[here - 1]
-        return layout.lengths_m[layout.tour[here]] + changed - layout.edge_m[here]
+    def changed(here: Indices, target: Indices) -> FloatArray:
+        owner, left, right = layout.tour[here], rows[here - 1], rows[here + 1]
+        added: FloatArray = figures[:, owner, left, target] + figures[:, owner, target, right]
+        return layout.totals[:, owner] + added - layout.edge[:, here - 1] - layout.edge[:, here]
 
     def paths(index: int) -> dict[int, Indices]:
-        changed = {}
+        swapped = {}
         for here, there in ((at[index], with_[index]), (with_[index], at[index])):
             tour = int(layout.tour[here])
-            changed[tour] = layout.paths[tour].copy()
-            changed[tour][here - layout.firsts[tour]] = rows[there]
-        return changed
+            swapped[tour] = layout.paths[tour].copy()
+            swapped[tour][here - layout.firsts[tour]] = rows[there]
+        return swapped
 
     allowed = layout.problem.has_role[one, rows[with_]] & layout.problem.has_role[other, rows[at]]
-    gains = layout.gains(one, length(at, rows[with_]), other, length(with_, rows[at]), allowed)
+    gains = layout.gains(one, changed(at, rows[with_]), other, changed(with_, rows[at]), allowed)
     return _Moves(gains, one, other, paths)
 
 
@@ -162,7 +161,7 @@ def _tails(layout: Layout, near: Indices) -> _Moves:
     keep = (join >= 0) & layout.is_open[join - 1] & (layout.tour[join] != layout.tour[cut])
     cut, join = cut[keep], join[keep]
     one, other = layout.tour[cut], layout.tour[join]
-    one_m, other_m = _spliced_m(layout, cut, join), _spliced_m(layout, join - 1, cut + 1)
+    new_one, new_other = _spliced(layout, cut, join), _spliced(layout, join - 1, cut + 1)
 
     def paths(index: int) -> dict[int, Indices]:
         tours = int(one[index]), int(other[index])
@@ -176,13 +175,14 @@ def _tails(layout: Layout, near: Indices) -> _Moves:
 
     has_role = layout.problem.has_role
     alike = (has_role[:, None] == has_role[None, :]).all(axis=2)
-    return _Moves(layout.gains(one, one_m, other, other_m, alike[one, other]), one, other, paths)
+    return _Moves(layout.gains(one, new_one, other, new_other, alike[one, other]), one, other, paths)
 
 
-def _spliced_m(layout: Layout, head: Indices, tail: Indices) -> FloatArray:
-    """Metres of paths up to the places `head`, then on from the places `tail` of other paths to their own ends."""
-    metres, rows, along_m = layout.problem.finite, layout.rows, layout.along_m
-    recovery, last = layout.lasts[layout.tour[head]], layout.lasts[layout.tour[tail]] - 1
-    has_tail = tail <= last
-    over_m = metres[rows[head], rows[tail]] + along_m[last] - along_m[tail] + metres[rows[last], rows[recovery]]
-    return np.where(has_tail, along_m[head] + over_m, along_m[head] + layout.joint_m(head, recovery))
+def _spliced(layout: Layout, head: Indices, tail: Indices) -> FloatArray:
+    """Figures of paths up to the places `head`, then from the places `tail` of other paths to their own ends."""
+    figures, rows, owner = layout.problem.figures, layout.rows, layout.tour[head]
+    recovery, last = layout.lasts[owner], layout.lasts[layout.tour[tail]] - 1
+    before = layout.between(owner, layout.firsts[owner], head)
+    over = figures[:, owner, rows[head], rows[tail]] + layout.between(owner, tail, last)
+    over += figures[:, owner, rows[last], rows[recovery]]
+    return np.asarray(before + np.where(tail <= last, over, layout.joint(head, recovery)))

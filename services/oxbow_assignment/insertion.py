@@ -9,13 +9,16 @@ import numpy as np
 
 from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
-from oxbow_assignment.assignment import tour_length
-from oxbow_assignment.problem import ROUNDING, Problem
+from oxbow_assignment.assignment import tour_figures, tour_length
+from oxbow_assignment.problem import COST, LENGTH, ROUNDING, Problem
 
 __all__ = ["inserted", "traded", "trimmed"]
 
 VALUE_ROUNDING = 1e-9
 """Differences of value below this are rounding."""
+
+FAR_M = 1e12
+"""A detour that does not fit counts as so long, where a finite figure is needed."""
 
 LEAST_SAVED_S = 1e-6
 """Savings below this are rounding."""
@@ -31,9 +34,10 @@ def trimmed(
     """
     inner = path[1:-1]
     path = np.concatenate([path[:1], inner[problem.can_visit[vehicle, inner]], path[-1:]])
-    while tour_length(problem, path) > problem.lengths_m[vehicle]:
+    metres = problem.figures[LENGTH, vehicle]
+    while tour_length(problem, vehicle, path) > problem.lengths_m[vehicle]:
         before, at, after = path[:-2], path[1:-1], path[2:]
-        saved = problem.finite[before, at] + problem.finite[at, after] - problem.finite[before, after]
+        saved = metres[before, at] + metres[at, after] - metres[before, after]
         worth = saved / problem.values[at]
         worth[at == wanted] = np.finfo(float).min
         worth[:held] = -np.inf
@@ -99,10 +103,11 @@ class _Trade:
 
 def _trade(problem: Problem, vehicle: int, path: Indices, held: int, target: np.intp) -> _Trade:
     before, after = path[held:-1], path[held + 1 :]
-    detours = problem.finite[before, target] + problem.finite[target, after] - problem.finite[before, after]
+    costs = problem.figures[COST, vehicle]
+    detours = costs[before, target] + costs[target, after] - costs[before, after]
     longer = np.insert(path, held + 1 + int(detours.argmin()), target)
     traded = trimmed(problem, vehicle, longer, held=held, wanted=target)
-    added_m = tour_length(problem, traded) - tour_length(problem, path)
+    added_m = float((tour_figures(problem, vehicle, traded) - tour_figures(problem, vehicle, path))[COST])
     value = problem.values[traded[1:-1]].sum() - problem.values[path[1:-1]].sum()
     return _Trade(vehicle, traded, float(value), added_m / problem.vehicles[vehicle].speed_mps)
 
@@ -119,14 +124,15 @@ class _Offers:
 
 
 def _offers(problem: Problem, vehicle: int, path: Indices, held: int, pool: Indices) -> _Offers:
-    before, after = path[held:-1], path[held + 1 :]
-    length_m = tour_length(problem, path)
-    kept_m = problem.finite[before, after] if len(path) > 2 else np.zeros(1)
-    added = problem.finite[np.ix_(pool, before)] + problem.finite[np.ix_(pool, after)] - kept_m
-    places = added.argmin(axis=1)
-    lengths = length_m + added[np.arange(len(pool)), places]
-    strain = problem.strain(np.append(lengths, length_m), np.full(len(pool) + 1, vehicle))
+    before, after, own = path[held:-1], path[held + 1 :], problem.figures[:, vehicle]
+    now = tour_figures(problem, vehicle, path)
+    kept = own[:, before, after] if len(path) > 2 else np.zeros((2, 1))
+    added = own[:, pool[:, None], before] + own[:, pool[:, None], after] - kept[:, None]
     limit_m = problem.lengths_m[vehicle] * (1.0 - ROUNDING if len(path) > 2 else 1.0)
-    fits = problem.has_role[vehicle, pool] & (lengths <= limit_m)
-    costs = np.where(fits, (strain[:-1] - strain[-1]) / problem.values[pool], np.inf)
+    fits = problem.has_role[vehicle, pool, None] & (now[LENGTH] + added[LENGTH] <= limit_m)
+    detours = np.where(fits, added[COST], np.inf)
+    places = detours.argmin(axis=1)
+    longer = now[COST] + np.minimum(detours.min(axis=1), FAR_M)
+    strain = problem.strain(np.append(longer, now[COST]), np.full(len(pool) + 1, vehicle))
+    costs = np.where(fits.any(axis=1), (strain[:-1] - strain[-1]) / problem.values[pool], np.inf)
     return _Offers(costs=costs, places=held + 1 + places)

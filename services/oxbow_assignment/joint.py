@@ -45,7 +45,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class Solution:
-    """The clustered assignment, the joint one if there is one, and the gap between them."""
+    """The clustered assignment, the joint one if there is one, and how far the clusters stay behind it."""
 
     clustered: Clustered
     joint: Assignment | None
@@ -57,6 +57,11 @@ class Solution:
         if self.joint is None:
             return self.clustered.assignment
         return min(self.clustered.assignment, self.joint, key=lambda found: found.rank)
+
+    @property
+    def best_gap(self) -> Gap:
+        """The gap between the best and the joint one: 0 where that is the best, below 0 where it is not."""
+        return self.gap if self.joint is None else gap_to(self.best, self.joint)
 
 
 def solve(
@@ -102,10 +107,10 @@ def optimise(problem: Problem, *, patience: int = PATIENCE, seed: int = 0) -> As
     if problem.objective is Objective.TOTAL:
         return best
     missed_s = 0.0
-    while best.makespan_s - missed_s > PRECISION * best.makespan_s:
-        within_s = (best.makespan_s + missed_s) / 2
+    while best.cost_s - missed_s > PRECISION * best.cost_s:
+        within_s = (best.cost_s + missed_s) / 2
         found = assignment_of(problem, solved(problem, patience=patience, seed=seed, within_s=within_s))
-        if found.value == best.value and found.makespan_s < best.makespan_s:
+        if found.value == best.value and found.cost_s < best.cost_s:
             best = found
         else:
             missed_s = within_s

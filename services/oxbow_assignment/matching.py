@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow_assignment.clustering import Clusters
-from oxbow_assignment.problem import Problem
+from oxbow_assignment.problem import COST, Problem
 
 __all__ = ["match"]
 
@@ -38,15 +38,16 @@ def match(problem: Problem, clusters: Clusters, targets: Indices) -> Indices:
     """
     shares = np.eye(clusters.count)[clusters.labels]
     shares /= shares.sum(axis=0)
-    from_start = problem.finite[np.ix_(problem.starts, targets)] @ shares
-    between = shares.T @ problem.finite[np.ix_(targets, targets)] @ shares
-    barred = ~problem.can_visit[:, targets] @ shares * OUT_OF_REACH * problem.finite.max()
+    costs = problem.figures[COST]
+    from_start = costs[np.arange(len(costs))[:, None], problem.starts[:, None], targets] @ shares
+    between = shares.T @ costs[:, targets[:, None], targets] @ shares
+    barred = ~problem.can_visit[:, targets] @ shares * OUT_OF_REACH * costs.max()
     owners = np.full(clusters.count, -1)
     lengths: FloatArray = from_start
     while (left := np.flatnonzero(owners < 0)).size:
-        costs = (lengths + barred) / problem.speeds_mps[:, None]
-        vehicles, columns = linear_sum_assignment(costs[:, left])
+        durations = (lengths + barred) / problem.speeds_mps[:, None]
+        vehicles, columns = linear_sum_assignment(durations[:, left])
         owners[left[columns]] = vehicles
         lengths = lengths.copy()
-        lengths[vehicles] = between[left[columns]]
+        lengths[vehicles] = between[vehicles, left[columns]]
     return owners

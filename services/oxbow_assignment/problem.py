@@ -1,4 +1,8 @@
-"""What is to be shared out: targets, vehicles, and the metres between them."""
+"""What is to be shared out: targets, vehicles, and the metres between them.
+
+Routes have two figures: what they cost, danger included, and how long they are. Costs are what an assignment makes
+small; lengths are what must be within a range.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +17,10 @@ from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray, Role, Vehicle
 from oxbow.errors import InvalidMission
 
-__all__ = ["ROUNDING", "Objective", "Problem", "require_distances"]
+__all__ = ["COST", "LENGTH", "ROUNDING", "Objective", "Problem", "require_distances"]
+
+COST, LENGTH = 0, 1
+"""The two figures of a route, first index of arrays that have both."""
 
 
 ROUNDING = 1e-12
@@ -31,7 +38,7 @@ class Objective(enum.StrEnum):
 
     `TOTAL` is the sum of all vehicles' durations: the team cost J of Innocenti, Pollini and Bracci 2006,
     section 4.2. It may leave vehicles at home. `MAKESPAN` is the longest duration: when the last vehicle is
-    done.
+    done. Durations are those of costs: a metre that danger is worth counts as one that is travelled.
     """
 
     TOTAL = "total"
@@ -46,15 +53,18 @@ class Problem:
     ----------
     vehicles
         At least one; names are different.
-    distances : ndarray of shape (n + 2 v, n + 2 v)
-        Metres along the shortest routes between the n targets, then the v vehicles' starts, then their recoveries:
-        what `Router.distances` gives for these points in this order. Symmetric; infinite where there is no route.
+    distances : ndarray of shape (n + 2 v, n + 2 v), or (v, n + 2 v, n + 2 v)
+        Metres along the routes between the n targets, then the v vehicles' starts, then their recoveries: what
+        `RouteTable` gives for these points in this order, for all vehicles or for each. Symmetric; infinite where
+        there is no route.
     objective
         What to make small.
     values : ndarray of shape (n,)
         What it is worth to visit each target; > 0, by default 1. Where not all can be visited, value comes first.
     roles
         For each target the role that a vehicle needs to visit it, or None for any; by default None for all.
+    costs : ndarray of shape (n + 2 v, n + 2 v), or (v, n + 2 v, n + 2 v)
+        What the same routes cost, in metres; by default their lengths.
 
     Raises
     ------
@@ -67,13 +77,15 @@ class Problem:
     objective: Objective = Objective.TOTAL
     values: FloatArray = field(default_factory=lambda: np.empty(0))
     roles: tuple[Role | None, ...] = ()
+    costs: FloatArray | None = None
 
     def __post_init__(self) -> None:
         require_vehicles(self.vehicles)
-        require_distances(self.distances)
-        if len(self.distances) < 2 * len(self.vehicles):
+        for own in self.distances.reshape(-1, *self.distances.shape[-2:]):
+            require_distances(own)
+        if self.distances.shape[-1] < 2 * len(self.vehicles):
             raise InvalidMission(
-                f"has {len(self.distances)} rows; expected at least {2 * len(self.vehicles)}:"
+                f"has {self.distances.shape[-1]} rows; expected at least {2 * len(self.vehicles)}:"
                 f" a start and a recovery for each of {len(self.vehicles)} vehicles",
                 where="distances",
             )
@@ -87,7 +99,7 @@ class Problem:
     @property
     def count(self) -> int:
         """How many targets there are."""
-        return len(self.distances) - 2 * len(self.vehicles)
+        return int(self.distances.shape[-1]) - 2 * len(self.vehicles)
 
     def path(self, vehicle: int, targets: Sequence[int] | Indices) -> Indices:
         """The rows that a vehicle passes: its start, its targets and its recovery."""
@@ -118,26 +130,48 @@ class Problem:
         """Each vehicle's speed, shape (v,)."""
         return np.array([vehicle.speed_mps for vehicle in self.vehicles])
 
-    def strain(self, lengths_m: FloatArray, vehicles: Indices) -> FloatArray:
-        """What tours of these lengths add to the objective, each for the vehicle beside it.
+    def strain(self, costs_m: FloatArray, vehicles: Indices) -> FloatArray:
+        """What tours of these costs add to the objective, each for the vehicle beside it.
 
         The longest duration alone does not tell good moves between other tours: for `MAKESPAN` the strain is a
         high power of the duration, whose sum the longest ones rule.
         """
-        durations: FloatArray = lengths_m / self.speeds_mps[vehicles]
+        durations: FloatArray = costs_m / self.speeds_mps[vehicles]
         return durations**MAKESPAN_POWER if self.objective is Objective.MAKESPAN else durations
 
     @cached_property
-    def finite(self) -> FloatArray:
-        """The distances, with one beyond every range where there is no route."""
-        known = self.distances[np.isfinite(self.distances)]
-        far_m = 2.0 * max(float(known.max()), float(self.lengths_m.max()))
-        return np.where(np.isfinite(self.distances), self.distances, far_m)
+    def lengths(self) -> FloatArray:
+        """Lengths of routes for each vehicle, infinite where there is none, shape (v, n + 2 v, n + 2 v)."""
+        rows = self.distances.shape[-1]
+        return np.broadcast_to(self.distances, (len(self.vehicles), rows, rows))
+
+    @cached_property
+    def figures(self) -> FloatArray:
+        """Costs and lengths of routes for each vehicle, shape (2, v, n + 2 v, n + 2 v).
+
+        Where there is no route, both are beyond every range.
+        """
+        costs = self.distances if self.costs is None else self.costs
+        both = np.stack([np.broadcast_to(costs, self.lengths.shape), self.lengths])
+        far_m = 2.0 * max(float(both[np.isfinite(both)].max()), float(self.lengths_m.max()))
+        return np.where(np.isfinite(both), both, far_m)
+
+    @cached_property
+    def mean_costs(self) -> FloatArray:
+        """What routes cost the vehicles on average, shape (n + 2 v, n + 2 v)."""
+        return np.asarray(self.figures[COST].mean(axis=0))
 
     @cached_property
     def there_and_back_m(self) -> FloatArray:
-        """The route of each vehicle that visits one target alone, shape (v, n)."""
-        return self.distances[self.starts, self.targets] + self.distances[self.recoveries, self.targets]
+        """The length of the route of each vehicle that visits one target alone, shape (v, n)."""
+        each = np.arange(len(self.vehicles))
+        ends = self.lengths[each, self.starts] + self.lengths[each, self.recoveries]
+        return np.asarray(ends[:, self.targets])
+
+    def is_within_range(self, vehicle: int, path: Indices) -> bool:
+        """Whether a vehicle's path with targets is within its range."""
+        length_m = float(self.figures[LENGTH, vehicle, path[:-1], path[1:]].sum())
+        return len(path) <= 2 or length_m <= self.lengths_m[vehicle]
 
     @cached_property
     def has_role(self) -> Mask:

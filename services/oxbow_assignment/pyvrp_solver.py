@@ -13,7 +13,7 @@ from pyvrp.stop import NoImprovement
 
 from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
-from oxbow_assignment.problem import Problem
+from oxbow_assignment.problem import COST, LENGTH, Problem
 
 __all__ = ["solved"]
 
@@ -41,17 +41,17 @@ def solved(problem: Problem, *, patience: int, seed: int, within_s: float | None
 
 def _data(problem: Problem, within_s: float | None) -> ProblemData:
     lengths, count = problem.lengths_m, len(problem.vehicles)
-    longest_s = float((lengths / problem.speeds_mps).sum())
+    longest_s = float((lengths / problem.speeds_mps).sum()) + _most_danger_s(problem)
     prizes = _steps(PRIZE * longest_s * problem.values / problem.values.min(initial=np.inf))
-    far_m = 2.0 * max(float(lengths.max()), float(problem.finite.max()))
+    far_m = 2.0 * max(float(lengths.max()), float(problem.figures.max()))
     metres, seconds = [], []
     for vehicle, speed_mps in enumerate(problem.speeds_mps):
-        own = problem.finite.copy()
+        own = problem.figures[:, vehicle].copy()
         barred = np.flatnonzero(~problem.has_role[vehicle])
-        own[barred], own[:, barred] = far_m, far_m
-        np.fill_diagonal(own, 0.0)
-        metres.append(_steps(own))
-        seconds.append(_steps(own / speed_mps))
+        own[:, barred], own[:, :, barred] = far_m, far_m
+        own[:, np.arange(own.shape[1]), np.arange(own.shape[1])] = 0.0
+        metres.append(_steps(own[LENGTH]))
+        seconds.append(_steps(own[COST] / speed_mps))
     types = [
         VehicleType(
             start_depot=vehicle,
@@ -65,13 +65,19 @@ def _data(problem: Problem, within_s: float | None) -> ProblemData:
         for vehicle in range(count)
     ]
     return ProblemData(
-        locations=[Location(0, 0)] * len(problem.finite),
+        locations=[Location(0, 0)] * problem.figures.shape[-1],
         clients=[Client(target, prize=prize, required=False) for target, prize in enumerate(prizes.tolist())],
         depots=[Depot(row) for row in [*problem.starts.tolist(), *problem.recoveries.tolist()]],
         vehicle_types=types,
         distance_matrices=metres,
         duration_matrices=seconds,
     )
+
+
+def _most_danger_s(problem: Problem) -> float:
+    """What danger may be worth in all, at the most: on the costliest route from each place, for the slowest."""
+    danger_m = (problem.figures[COST] - problem.figures[LENGTH]).max(axis=(0, 1))
+    return float(danger_m.sum() / problem.speeds_mps.min())
 
 
 def _steps(figures: FloatArray) -> Any:

@@ -58,7 +58,7 @@ def handle(request: AssignRequest, show: Show) -> Assignment:
         left=campaign.left,
         treated_share=campaign.treated_share(first, request.swath_m),
         makespan_s=max((sortie.duration_s for sortie in sorties), default=0.0),
-        joint_gap=None if solution is None else solution.gap.relative,
+        joint_gap=None if solution is None else solution.best_gap.relative,
         warnings=reply.warnings + campaign.warnings,
     )
 

@@ -11,6 +11,7 @@ import shapely
 from shapely import LineString
 
 from oxbow.arrays import Indices
+from oxbow.contracts import FloatArray
 from oxbow.errors import Internal
 from oxbow.tolerances import ROUNDING_M
 from oxbow_assignment.assign import Clustering
@@ -18,7 +19,7 @@ from oxbow_assignment.division import Part
 from oxbow_assignment.fleet import Fleet, Ways
 from oxbow_assignment.joint import Solution, solve
 from oxbow_assignment.lines import joined
-from oxbow_assignment.problem import Objective, Problem
+from oxbow_assignment.problem import COST, LENGTH, Objective, Problem
 
 __all__ = ["Journey", "Schedule", "scheduled"]
 
@@ -72,7 +73,7 @@ def scheduled(parts: Sequence[Part], fleet: Fleet, *, seed: int = 0) -> Schedule
 
     A part is a target whose two ends are apart. Between parts, the problem counts the mean of the ways from either
     end of one to either end of the other, and half the length of both. The mean over all ways to turn the parts of
-    a tour round is what the problem counts: the best way, which is gone, is never longer.
+    a tour round is what the problem counts: the cheapest way costs no more, and the shortest is within range.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ def scheduled(parts: Sequence[Part], fleet: Fleet, *, seed: int = 0) -> Schedule
     """
     if not parts:
         return Schedule((), None)
-    ways = fleet.ways([part.line for part in parts])
+    ways = fleet.ways([part.line for part in parts], [part.spot for part in parts])
     left = np.arange(len(parts))
     rounds: list[tuple[Journey, ...]] = []
     first: Solution | None = None
@@ -93,7 +94,7 @@ def scheduled(parts: Sequence[Part], fleet: Fleet, *, seed: int = 0) -> Schedule
         patience = PATIENCE if first is None and len(left) <= JOINT_MOST else None
         solution = solve(_problem(parts, fleet, ways, left), Clustering(seed=seed), patience=patience, seed=seed)
         first = first or solution
-        tours = [left[list(tour.targets)] for tour in solution.clustered.assignment.tours]
+        tours = [left[list(tour.targets)] for tour in solution.best.tours]
         rounds.append(
             tuple(_journey(slave, tour, parts, fleet, ways) for slave, tour in enumerate(tours) if len(tour))
         )
@@ -106,15 +107,21 @@ def scheduled(parts: Sequence[Part], fleet: Fleet, *, seed: int = 0) -> Schedule
 def _problem(parts: Sequence[Part], fleet: Fleet, ways: Ways, left: Indices) -> Problem:
     """The problem of what is left: mean ways between parts, with half of the parts' lengths on either side."""
     count, boats = len(left), len(fleet.slaves)
+    rows = count + 2 * boats
     half_m = ways.lengths_m[left] / 2
-    distances = np.zeros((count + 2 * boats, count + 2 * boats))
-    distances[:count, :count] = ways.between[np.ix_(left, left)].mean(axis=(2, 3)) + half_m[:, None] + half_m
-    access = np.vstack([ways.starts[:, left].mean(axis=2), ways.recoveries[:, left].mean(axis=2)]) + half_m
-    distances[count:, :count], distances[:count, count:] = access, access.T
-    np.fill_diagonal(distances, 0.0)
+    figures = np.zeros((2, boats, rows, rows))
+    between = ways.between[:, :, left[:, None], left].mean(axis=(4, 5))
+    figures[:, :, :count, :count] = between + half_m[:, None] + half_m
+    starts, recoveries = (of[:, :, left].mean(axis=3) + half_m for of in (ways.starts, ways.recoveries))
+    # No vehicle goes by another one's start or recovery: what is there serves to fill the matrix.
+    access = np.concatenate([starts, recoveries], axis=1)
+    figures[:, :, count:, :count] = access[:, None]
+    figures[:, :, :count, count:] = access[:, None].swapaxes(2, 3)
+    figures[:, :, np.arange(rows), np.arange(rows)] = 0.0
     return Problem(
         vehicles=fleet.cautious_slaves,
-        distances=distances,
+        distances=figures[LENGTH],
+        costs=figures[COST],
         objective=Objective.MAKESPAN,
         values=np.array([parts[number].value for number in left.tolist()], dtype=float),
     )
@@ -122,16 +129,19 @@ def _problem(parts: Sequence[Part], fleet: Fleet, ways: Ways, left: Indices) -> 
 
 def _journey(slave: int, tour: Indices, parts: Sequence[Part], fleet: Fleet, ways: Ways) -> Journey:
     """The path of one tour, its parts turned the best way, checked."""
+    turns = _turns(slave, tour, ways, fleet.slaves[slave].length_m)
+    numbers = tour.tolist()
     lines = [
-        parts[number].line.reverse() if backwards else parts[number].line
-        for number, backwards in zip(tour.tolist(), _turns(slave, tour, ways), strict=True)
+        parts[number].line.reverse() if turn else parts[number].line
+        for number, turn in zip(numbers, turns, strict=True)
     ]
     stops = [fleet.out[slave], *lines, fleet.home[slave]]
-    own = fleet.routers[slave]
-    routers = [own, *[fleet.router] * (len(lines) - 1), own]
+    enters = [2 * number + turn for number, turn in zip(numbers, turns, strict=True)]
     routes = [
-        router.route(before.coords[-1], after.coords[0]).line
-        for router, (before, after) in zip(routers, pairwise(stops), strict=True)
+        ways.out(slave, enters[0]),
+        # Who enters a line at one end leaves it at the other.
+        *(ways.route(slave, before ^ 1, after) for before, after in pairwise(enters)),
+        ways.home(slave, enters[-1] ^ 1),
     ]
     travelled = [stops[0], *(line for pair in zip(routes, stops[1:], strict=True) for line in pair)]
     path = joined(travelled)
@@ -139,19 +149,41 @@ def _journey(slave: int, tour: Indices, parts: Sequence[Part], fleet: Fleet, way
     return Journey(slave, tuple(tour.tolist()), path, tuple(routes))
 
 
-def _turns(slave: int, tour: Indices, ways: Ways) -> list[bool]:
-    """Which parts to travel backwards, for the shortest path: by dynamic programming along the tour."""
-    metres = ways.starts[slave, tour[0]]
+def _turns(slave: int, tour: Indices, ways: Ways, range_m: float) -> list[int]:
+    """Which parts to travel backwards (1), for the cheapest path within range.
+
+    Where the cheapest is too long, for what is cheapest while metres count some times more; at last, the shortest.
+    """
+    for weights in ((1.0, 0.0), (1.0, 1.0), (1.0, 10.0), (0.0, 1.0)):
+        turns = _best_turns(slave, tour, ways, np.array(weights))
+        if _length_m(slave, tour, turns, ways) <= range_m:
+            break
+    return turns
+
+
+def _best_turns(slave: int, tour: Indices, ways: Ways, weights: FloatArray) -> list[int]:
+    """The turns of least weighted cost and length, by dynamic programming along the tour."""
+    starts, recoveries = (np.tensordot(weights, of[:, slave], 1) for of in (ways.starts, ways.recoveries))
+    so_far = starts[tour[0]]
     came_from: list[Indices] = []
     for before, after in pairwise(tour):
         # Who enters at one end leaves at the other.
-        longer = metres[:, None] + ways.between[before, after][::-1]
+        longer = so_far[:, None] + np.tensordot(weights, ways.between[:, slave, before, after], 1)[::-1]
         came_from.append(longer.argmin(axis=0))
-        metres = longer.min(axis=0)
-    turns = [int((metres + ways.recoveries[slave, tour[-1]][::-1]).argmin())]
+        so_far = longer.min(axis=0)
+    turns = [int((so_far + recoveries[tour[-1]][::-1]).argmin())]
     for best in reversed(came_from):
         turns.append(int(best[turns[-1]]))
-    return [bool(turn) for turn in reversed(turns)]
+    return turns[::-1]
+
+
+def _length_m(slave: int, tour: Indices, turns: Sequence[int], ways: Ways) -> float:
+    """Metres of a tour with its parts turned."""
+    enters = np.array(turns)
+    hops = ways.between[LENGTH, slave, tour[:-1], tour[1:], 1 - enters[:-1], enters[1:]].sum()
+    out = ways.starts[LENGTH, slave, tour[0], enters[0]]
+    home = ways.recoveries[LENGTH, slave, tour[-1], 1 - enters[-1]]
+    return float(out + hops + home + ways.lengths_m[tour].sum())
 
 
 def _require_conforming(path: LineString, fleet: Fleet, slave: int) -> None:

@@ -19,6 +19,7 @@ from oxbow.contracts import (
     HotSpot,
     Per,
     Sortie,
+    Vehicle,
 )
 from oxbow.errors import Infeasible
 from oxbow.recording import Layer, discard
@@ -77,12 +78,62 @@ def test_any_of_several_vehicles_may_come_to_harm():
     assert judged(sortie, zone(box(5, 550, 10, 600))).danger == 0.0
 
 
-def test_danger_counts_against_a_range():
-    (left,) = reply(zone(BAR, 0.9)).left
-    assert left.hot_spot == "bloom"
-    assert "m there and home, what danger is worth included" in left.reason
-    careless = reply(zone(BAR, 0.9), danger_detour_m=0.0)
-    assert (careless.left, len(careless.sorties)) == ((), 1)
+def boat(length_m: float = 4_000.0, **more) -> Vehicle:
+    return replaced(slave(START, length_m=length_m), **more)
+
+
+def test_danger_is_no_length():
+    """What a zone is worth keeps nobody home, whether it is crossed or never entered."""
+    plain_m = reply().sorties[0].length_m
+    crossed = reply(zone(BAR, 0.999), vehicles=(boat(plain_m + 1.0, danger_factor=100.0),))
+    assert (crossed.left, [sortie.length_m for sortie in crossed.sorties]) == ((), [pytest.approx(plain_m)])
+    beside = reply(zone(box(0, 500, 1_000, 610), 0.999), vehicles=(boat(plain_m + 1.0),))
+    assert encode(beside) == encode(reply(vehicles=(boat(plain_m + 1.0),)))
+
+
+def test_what_a_detour_makes_too_far_is_left_with_metres_that_are_travelled():
+    (left,) = reply(zone(), vehicles=(boat(1_600.0),)).left
+    assert "would travel 1705 m" in left.reason
+    assert "m there and home, round danger zones where that is worth it" in left.reason
+    assert not reply(zone(), vehicles=(boat(1_900.0),)).left
+
+
+@quick
+@given(
+    seed=st.integers(0, 10_000),
+    factors=st.lists(st.floats(1.0, 30.0), min_size=2, max_size=3),
+    crossing=st.floats(0.0, 0.6),
+    metre=st.floats(0.0, 3e-3),
+)
+def test_a_sortie_never_takes_more_danger_for_who_is_less_fit(seed, factors, crossing, metre):
+    rng = np.random.default_rng(seed)
+    zones = (
+        DangerZone(name="lane", area=blob(rng, POND, 150.0).buffer(0.0), probability=crossing),
+        DangerZone(name="shallows", area=blob(rng, POND, 150.0).buffer(0.0), probability=metre, per=Per.METRE),
+    )
+    taken = []
+    for factor in sorted(factors):
+        (sortie,) = reply(*zones, vehicles=(boat(1e5, danger_factor=factor),), danger_detour_m=150.0).sorties
+        taken.append(judged(sortie, *zones).danger)
+    assert (np.diff(taken) <= 1e-6).all()
+
+
+def test_a_vehicle_is_less_fit_for_some_hot_spots():
+    near = HotSpot(name="near", area=box(700, 335, 760, 345), value=1.0)
+    for spot, crossings in (("bloom", 0), ("near", 2)):
+        unfit = boat(danger_factors={"bloom": 20.0})
+        only = replaced(near, name=spot)
+        (sortie,) = reply(zone(), vehicles=(unfit,), hot_spots=(only,), danger_detour_m=150.0).sorties
+        assert judged(sortie, zone()).danger == pytest.approx(1.0 - 0.5**crossings)
+
+
+def test_less_fit_between_hot_spots_too():
+    """The bar between two hot spots has to be crossed; the reef is gone round by who is unfit."""
+    spots = (SPOT, HotSpot(name="west", area=box(250, 295, 310, 305), value=1.0))
+    for factor, danger in ((1.0, 0.75), (20.0, 0.0)):
+        fleet = (boat(danger_factor=factor),)
+        (sortie,) = reply(zone(), vehicles=fleet, hot_spots=spots, danger_detour_m=150.0).sorties
+        assert judged(sortie, zone()).danger == pytest.approx(danger)
 
 
 def test_who_is_less_fit_is_sent_less():

@@ -192,3 +192,22 @@ def test_a_danger_of_1_is_refused_by_name():
         Danger(a=0.9)
     with pytest.raises(InvalidMission, match="c_max_m: is inf"):
         Danger(c_max_m=math.inf)
+
+
+@every_method
+@quick
+@given(seed=st.integers(0, 10_000))
+def test_a_table_has_the_length_and_the_line_of_every_route(seed, method):
+    water = scene(seed, obstacles=3)
+    points = places_in(water, 4, seed)
+    danger = Danger((per_metre(0.01), per_crossing(0.2, box(10, 10, 50, 45))), c_max_m=100.0, a=2.0)
+    router = make_router(method, water, danger)
+    table = router.table(points)
+    assert np.array_equal(table.costs, router.distances(points))
+    assert np.array_equal(table.lengths_m, table.lengths_m.T)
+    for i, j in ((0, 1), (3, 1), (2, 2)):
+        line = table.polyline(i, j)
+        assert np.array_equal(line[[0, -1]], np.array([points[i], points[j]]))
+        assert np.hypot(*np.diff(line, axis=0).T).sum() == pytest.approx(table.lengths_m[i, j])
+        worth_m = table.lengths_m[i, j] - 100.0 * 2.0 * math.log1p(-danger.probability(line))
+        assert i == j or table.costs[i, j] == pytest.approx(worth_m)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import math
 
+from msgspec import field
 from shapely import LineString, Polygon
 
 from oxbow.contracts.contour import DroppedPart
@@ -51,6 +52,8 @@ class Vehicle(Message, frozen=True, kw_only=True):
     danger_factor
         At least 1: how many times as much danger counts for it; `a` of Innocenti, Pollini and Bracci 2006,
         section 3.
+    danger_factors
+        The same on the way to and from some hot spots, by name: the report sets it for a vehicle and a target.
 
     Raises
     ------
@@ -65,6 +68,7 @@ class Vehicle(Message, frozen=True, kw_only=True):
     start: Place
     recovery: Place
     danger_factor: float = 1.0
+    danger_factors: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -73,10 +77,16 @@ class Vehicle(Message, frozen=True, kw_only=True):
             raise InvalidMission(
                 f"is {excerpt(self.name)}; expected at most {MOST_ID_CHARACTERS} characters", where="name"
             )
-        with renamed({field: f"vehicle {self.name!r}: {field}" for field in self.__struct_fields__}):
+        with renamed({name: f"vehicle {self.name!r}: {name}" for name in self.__struct_fields__}):
             require_finite(self, "speed_mps", "length_m", above=0.0, most=MOST_LENGTH_M)
             require_finite(self, "danger_factor", least=1.0)
             require_place(self, "start", "recovery")
+        for spot, factor in self.danger_factors.items():
+            if not 1.0 <= factor < math.inf:
+                raise InvalidMission(
+                    f"is {factor!r}; expected a finite number >= 1",
+                    where=f"vehicle {self.name!r}: danger_factors[{excerpt(spot)}]",
+                )
 
 
 class HotSpot(Message, frozen=True, kw_only=True):
@@ -202,7 +212,8 @@ class Assignment(Message, frozen=True, kw_only=True):
     makespan_s
         Duration of the longest sortie.
     joint_gap
-        How much longer the makespan is than a joint optimiser's, as a part of that; None without the optimiser.
+        How much more the sorties cost than a joint optimiser's, as a part of that: 0 where its own are the best,
+        and are taken. None without the optimiser, and where it serves less.
     """
 
     shares: tuple[Share, ...] = ()

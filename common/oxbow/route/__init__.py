@@ -6,7 +6,7 @@ from oxbow.route.dynamic import DynamicRouter
 from oxbow.route.field import lengths_from
 from oxbow.route.gate_routes import Routes
 from oxbow.route.methods import make_router
-from oxbow.route.route import Route, RouteMethod, Router
+from oxbow.route.route import Route, RouteMethod, Router, RouteTable
 
 __all__ = [
     "NO_DANGER",
@@ -15,6 +15,7 @@ __all__ = [
     "Landing",
     "Route",
     "RouteMethod",
+    "RouteTable",
     "Router",
     "Routes",
     "lengths_from",

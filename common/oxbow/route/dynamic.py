@@ -23,7 +23,7 @@ from oxbow.route.danger import NO_DANGER, Danger
 from oxbow.route.mesh import Mesh
 from oxbow.route.methods import router_on
 from oxbow.route.retriangulation import GRID_M, retriangulated
-from oxbow.route.route import Route, RouteMethod, Router
+from oxbow.route.route import Route, RouteMethod, Router, RouteTable
 from oxbow.tolerances import ROUNDING_M
 
 __all__ = ["DynamicRouter"]
@@ -98,6 +98,10 @@ class DynamicRouter:
     def route(self, start: npt.ArrayLike, goal: npt.ArrayLike) -> Route:
         """The route among the present obstacles; see `Router.route`."""
         return self._router.route(start, goal)
+
+    def table(self, points: npt.ArrayLike) -> RouteTable:
+        """The routes among the present obstacles; see `Router.table`."""
+        return self._router.table(points)
 
     def distances(self, points: npt.ArrayLike) -> FloatArray:
         """Costs of routes among the present obstacles; see `Router.distances`."""

@@ -18,7 +18,7 @@ from oxbow.contracts import FloatArray
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.route.danger import Danger
 from oxbow.route.mesh import Mesh, Touches
-from oxbow.route.route import Route, RouteMethod, judged
+from oxbow.route.route import Route, RouteMethod, RouteTable, judged
 from oxbow.route.search import Arcs, Ways, cheapest_ways, distinct
 
 __all__ = ["Drawn", "Ends", "Links", "Network", "NetworkRouter", "Way"]
@@ -123,15 +123,35 @@ class NetworkRouter:
 
     def distances(self, points: npt.ArrayLike) -> FloatArray:
         """Costs of the routes between all pairs; see `Router.distances`."""
+        return self.table(points).costs
+
+    def table(self, points: npt.ArrayLike) -> RouteTable:
+        """The routes between all pairs; see `Router.table`."""
         points = _checked_places(points)
         found = self._found(points, [f"points[{number}]" for number in range(len(points))], starts=len(points))
-        costs = found.costs if self.drawn is None else self._line_costs(found)
+        one_way, lengths_m = self._figures(found)
         # Starting inside a danger zone costs as well.
         danger = self.network.danger
-        matrix = costs + danger.hazard_m * danger.hazards_at(points)[:, None]
-        matrix = np.minimum(matrix, matrix.T)
-        np.fill_diagonal(matrix, 0.0)
-        return matrix
+        one_way = one_way + danger.hazard_m * danger.hazards_at(points)[:, None]
+        # Of two equal ones, that from the earlier point is the route both ways.
+        is_back = (one_way > one_way.T) | (np.tri(len(points), k=-1, dtype=np.bool_) & (one_way >= one_way.T))
+        costs, lengths_m = (np.where(is_back, there.T, there) for there in (one_way, lengths_m))
+        np.fill_diagonal(costs, 0.0)
+        np.fill_diagonal(lengths_m, 0.0)
+
+        def polyline(start: int, goal: int) -> FloatArray:
+            if start == goal:
+                return points[[start, goal]]
+            there = not is_back[start, goal]
+            return self._line(found, start, goal) if there else self._line(found, goal, start)[::-1]
+
+        return RouteTable(costs, lengths_m, polyline)
+
+    def _figures(self, found: _Found) -> tuple[FloatArray, FloatArray]:
+        """Costs and lengths of the routes from each point to the others; inf where none is known."""
+        if self.drawn is not None:
+            return self._line_figures(found)
+        return found.costs, found.lengths_m if self.network.danger.outlines else found.costs
 
     def _found(self, points: FloatArray, names: Sequence[str], *, starts: int) -> _Found:
         """Search the network, with the points put in to arrive at, from the first of them."""
@@ -148,7 +168,8 @@ class NetworkRouter:
             (departure + links.one, arrival + links.other),
         ):
             arcs += Arcs.one_way(places, *distinct(tails, heads), network.danger)
-        return _Found(ends, arrival, cheapest_ways(arcs.graph(len(places)), departure + np.arange(starts)))
+        ways = cheapest_ways(arcs.graph(len(places)), departure + np.arange(starts))
+        return _Found(ends, places, arrival, ways)
 
     def _line(self, found: _Found, start: int, goal: int) -> FloatArray:
         way = found.way(start, goal)
@@ -156,23 +177,25 @@ class NetworkRouter:
             return np.vstack([way.start, self.network.places[way.nodes], way.goal])
         return self.drawn(way)
 
-    def _line_costs(self, found: _Found) -> FloatArray:
-        """Costs of the routes drawn from each point to those after it; inf where there is none."""
-        costs = np.full_like(found.costs, np.inf)
+    def _line_figures(self, found: _Found) -> tuple[FloatArray, FloatArray]:
+        """Costs and lengths of the routes drawn from each point to those after it; inf where there is none."""
+        costs, lengths_m = np.full((2, *found.costs.shape), np.inf)
         first, last = np.nonzero(np.triu(np.isfinite(found.costs), 1))
         lines = [self._line(found, i, j) for i, j in zip(first.tolist(), last.tolist(), strict=True)]
         if lines:
             starts, ends = np.vstack([line[:-1] for line in lines]), np.vstack([line[1:] for line in lines])
             owner = np.repeat(np.arange(len(lines)), [len(line) - 1 for line in lines])
             costs[first, last] = np.bincount(owner, self.network.danger.costs(starts, ends))
-        return costs
+            lengths_m[first, last] = np.bincount(owner, np.hypot(*(ends - starts).T))
+        return costs, lengths_m
 
 
 @dataclass(frozen=True)
 class _Found:
-    """What a search between ends found; to arrive at them is numbered from `arrival`."""
+    """What a search between ends found over places; to arrive at them is numbered from `arrival`."""
 
     ends: Ends
+    places: FloatArray
     arrival: int
     ways: Ways
 
@@ -180,6 +203,18 @@ class _Found:
     def costs(self) -> FloatArray:
         """Costs of the ways from the first ends to all."""
         return self.ways.costs[:, self.arrival :]
+
+    @property
+    def lengths_m(self) -> FloatArray:
+        """Lengths of the ways from the first ends to all; inf where there is none."""
+        here = np.tile(np.arange(self.arrival, len(self.places)), (len(self.costs), 1))
+        source = np.arange(len(here))[:, None]
+        lengths_m = np.zeros(here.shape)
+        while ((before := self.ways.previous[source, here]) >= 0).any():
+            before = np.where(before >= 0, before, here)
+            lengths_m += np.hypot(*np.moveaxis(self.places[here] - self.places[before], -1, 0))
+            here = before
+        return np.where(np.isfinite(self.costs), lengths_m, np.inf)
 
     def way(self, start: int, goal: int) -> Way:
         """The way from one of the first ends to another."""

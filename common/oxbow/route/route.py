@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -15,7 +16,7 @@ from oxbow.contracts import FloatArray
 from oxbow.route.danger import Danger
 from oxbow.route.mesh import Mesh
 
-__all__ = ["Route", "RouteMethod", "Router", "judged"]
+__all__ = ["Route", "RouteMethod", "RouteTable", "Router", "judged"]
 
 
 class RouteMethod(enum.StrEnum):
@@ -60,6 +61,24 @@ class Route:
         return LineString(self.polyline)
 
 
+@dataclass(frozen=True)
+class RouteTable:
+    """Routes between all pairs of n places.
+
+    Parameters
+    ----------
+    costs, lengths_m : ndarray, shape (n, n)
+        Of the cheapest routes: in metres, with what danger is worth and without. Symmetric, 0 on the diagonal, inf
+        where no water leads from one place to the other.
+    polyline
+        The route from one place to another, by their numbers, shape (k, 2).
+    """
+
+    costs: FloatArray
+    lengths_m: FloatArray
+    polyline: Callable[[int, int], FloatArray]
+
+
 class Router(Protocol):
     """Finds routes through one water."""
 
@@ -70,6 +89,15 @@ class Router(Protocol):
         ------
         Infeasible
             Start or goal lies outside the water (`where` says which), or no water leads from one to the other.
+        """
+
+    def table(self, points: npt.ArrayLike) -> RouteTable:
+        """The routes between all pairs of places, shape (n, 2), in metres.
+
+        Raises
+        ------
+        Infeasible
+            A place lies outside the water; `where` is ``points[k]``.
         """
 
     def distances(self, points: npt.ArrayLike) -> FloatArray:
