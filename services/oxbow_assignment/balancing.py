@@ -70,9 +70,12 @@ def balanced_shares(mesh: Mesh, share: Indices, due_m2: FloatArray, allowed: Mas
         Shares, within `TOLERANCE` of what is due where the triangles allow it.
     """
     count = len(due_m2)
+    least, since = np.inf, 0
     for _ in range(TRANSFERS * count):
         areas = np.bincount(share, mesh.areas_m2, minlength=count).astype(float)
-        if imbalance(areas, due_m2) <= TOLERANCE:
+        uneven = imbalance(areas, due_m2)
+        least, since = (uneven, 0) if uneven < least else (least, since + 1)
+        if uneven <= TOLERANCE or since > count:
             break
         least_m2 = TOLERANCE * float(due_m2.min()) / 2
         for giver, taker, area_m2 in _transfers(mesh, share, areas - due_m2, least_m2):

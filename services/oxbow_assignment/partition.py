@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 from scipy.sparse.csgraph import dijkstra
 from shapely import Polygon
 
@@ -186,12 +187,22 @@ def due_areas_m2(mesh: Mesh, share: Indices, capacities: FloatArray) -> FloatArr
 def _rounds(mesh: Mesh, seeds: Indices, capacities: FloatArray, allowed: Mask) -> Iterator[Indices]:
     """Balanced shares from the given seeds, and from seeds that move to their middles."""
     for _ in range(ROUNDS):
-        share = _balanced(mesh, propagate(mesh, seeds).source, capacities, allowed)
+        share = _matched(mesh, propagate(mesh, seeds).source, allowed)
+        share = _balanced(mesh, share, capacities, allowed)
         yield share
         middles, before = _middles(mesh, share, len(capacities)), seeds
         seeds = np.where(allowed[np.arange(len(seeds)), middles], middles, seeds)
         if (seeds == before).all():
             break
+
+
+def _matched(mesh: Mesh, share: Indices, allowed: Mask) -> Indices:
+    """The same shares, each with the vehicle that suits it: such that the least of them is out of reach."""
+    if allowed.all():
+        return share
+    barred_m2 = (~allowed * mesh.areas_m2) @ (share[:, None] == np.arange(len(allowed)))
+    vehicles, shares = linear_sum_assignment(barred_m2)
+    return np.asarray(vehicles[np.argsort(shares)][share])
 
 
 def _balanced(mesh: Mesh, share: Indices, capacities: FloatArray, allowed: Mask) -> Indices:

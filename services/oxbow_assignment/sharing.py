@@ -137,8 +137,8 @@ def _footprint_m(free: Polygon, masters: int, footprint_m: float | None) -> floa
 
 
 def _edge_m(area: Polygon, triangles: int) -> float:
-    """The edge of equilateral triangles of which so many have the area."""
-    return math.sqrt(4.0 / math.sqrt(3.0) * area.area / triangles)
+    """The edge of equilateral triangles of which so many have the area, or, where it is thin, line its rim."""
+    return max(math.sqrt(4.0 / math.sqrt(3.0) * area.area / triangles), area.length / triangles)
 
 
 def _within_reach(mesh: Mesh, reach: Reach) -> Mask:

@@ -176,7 +176,7 @@ def test_no_other_way_to_turn_the_parts_is_shorter(seed, boats):
     parts = divided(found, fleet(*slaves)).parts
     schedule = scheduled(parts, fleet(*slaves))
     assert len(schedule.rounds) == 1
-    tours = {tour.vehicle: tour.length_m for tour in schedule.first.clustered.assignment.tours}
+    tours = {tour.vehicle: tour.length_m for tour in schedule.first.best.tours}
     for journey in schedule.rounds[0]:
         boat = slaves[journey.slave]
         lines = [parts[number].line for number in journey.parts]
