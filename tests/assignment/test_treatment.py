@@ -197,7 +197,7 @@ def test_a_journey_home_over_land_counts_its_legs():
     free = box(0, 0, 100, 100)
     boats = fleet(slave((-10.0, 50.0), length_m=500.0), free=free)
     ways = boats.ways([LineString([(10, 50), (20, 50)])])
-    assert ways.starts[0, 0].tolist() == [20.0, 30.0]
+    assert ways.starts[:, 0, 0].tolist() == [[20.0, 30.0], [20.0, 30.0]]
     assert ways.access_m[0, 0] == 50.0
 
 
