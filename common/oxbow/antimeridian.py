@@ -10,6 +10,7 @@ import shapely
 from shapely import Polygon
 
 from oxbow.contracts import FloatArray
+from oxbow.crossings import is_valid
 
 __all__ = ["Joined", "joined_at_antimeridian"]
 
@@ -52,7 +53,7 @@ def joined_at_antimeridian(polygons: Sequence[Sequence[FloatArray]]) -> list[Joi
 
 def _united(polygons: Mapping[int, Polygon]) -> Iterator[Joined]:
     """What polygons are together, with the keys of those that each is made of."""
-    sound = {key: polygon for key, polygon in polygons.items() if shapely.is_valid(polygon)}
+    sound = {key: polygon for key, polygon in polygons.items() if is_valid(polygon)}
     wholes = shapely.get_parts(shapely.union_all(list(sound.values())))
     inside = {key: polygon.representative_point() for key, polygon in sound.items()}
     for whole in wholes:

@@ -192,14 +192,13 @@ class _Zones:
 
     def _require_few_crossings(self, polygons: Geometries, outline: Polygon) -> None:
         """Refuse zones of which there would be more pieces than memory."""
-        rings = [shapely.get_coordinates(polygon)[:-1] for polygon in (*polygons, outline)]
-        edges = Edges(rings)
+        edges = Edges.of(np.array([*polygons, outline]))
         edges = edges.where(edges.within(shapely.total_bounds(polygons)))
         of_zones = edges.ring < len(polygons)
-        own, crossings = np.zeros(len(rings), dtype=int), 0
+        own, crossings = np.zeros(len(polygons), dtype=int), 0
         for pairs in edges.meetings(of=of_zones):
             one, other = edges.ring[pairs].T
-            own += np.bincount(one[one == other], minlength=len(rings))
+            own += np.bincount(one[one == other], minlength=len(polygons))
             crossings += int((one != other).sum())
             if own.sum() > MOST_OWN_CROSSINGS:
                 raise InvalidMission(

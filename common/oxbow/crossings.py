@@ -7,17 +7,19 @@ all that an index of them knows. What a drawn or surveyed contour has is a few o
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import shapely
 from shapely import Polygon, STRtree
+from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import Geometries, Indices, Mask
 from oxbow.contracts import FloatArray, Place
 
-__all__ = ["MOST_PAIRS", "Edges", "TooManyPairs", "self_contact"]
+__all__ = ["MOST_PAIRS", "Edges", "TooManyPairs", "is_valid", "self_contact"]
 
 MOST_PAIRS = 50_000_000
 """Pairs of edges whose boxes meet, of contours that are looked at together; shores have some four an edge."""
@@ -40,46 +42,67 @@ def self_contact(polygon: Polygon) -> Place | None:
     TooManyPairs
         It cannot be told in bounded time.
     """
-    edges = Edges([shapely.get_coordinates(polygon)[:-1]])
-    if len(edges) ** 2 > MOST_PAIRS:
-        for pairs in edges.meetings(sample=_SAMPLE):
-            contacts = edges.contacts(pairs)
-            if len(contacts):
-                return float(contacts[0, 0]), float(contacts[0, 1])
-    # Of an array, since the check of one polygon holds the interpreter for as long as it lasts.
-    if shapely.is_valid(np.array([polygon]))[0]:
+    for contact in _sampled_contacts(polygon):
+        return float(contact[0]), float(contact[1])
+    if _is_valid(polygon):
         return None
     x, y = map(float, re.findall(r"\[(\S+) (\S+)\]", shapely.is_valid_reason(polygon))[0])
     return x, y
 
 
-class Edges:
-    """The edges of closed rings, each given without its closing point, shape (n, 2).
+def is_valid(geometry: BaseGeometry) -> bool:
+    """Whether polygons are valid.
 
-    Attributes
+    Raises
+    ------
+    TooManyPairs
+        It cannot be told in bounded time.
+    """
+    return next(_sampled_contacts(geometry), None) is None and _is_valid(geometry)
+
+
+def _is_valid(geometry: BaseGeometry) -> bool:
+    # Of an array, since the check of one geometry holds the interpreter for as long as it lasts.
+    return bool(shapely.is_valid(np.array([geometry]))[0])
+
+
+def _sampled_contacts(geometry: BaseGeometry) -> Iterator[FloatArray]:
+    """Places where some edges of a geometry meet others of their ring; none of one whose edges are few."""
+    if int(shapely.get_num_coordinates(geometry)) ** 2 <= MOST_PAIRS:
+        return
+    edges = Edges.of(shapely.get_parts([geometry]))
+    for pairs in edges.meetings(sample=_SAMPLE):
+        yield from edges.contacts(pairs[edges.ring[pairs[:, 0]] == edges.ring[pairs[:, 1]]])
+
+
+@dataclass(frozen=True)
+class Edges:
+    """The edges of polygons.
+
+    Parameters
     ----------
     ends : ndarray of shape (edges, 2, 2)
         Both ends of each edge.
     ring : ndarray of shape (edges,)
-        The ring that each edge belongs to.
-    number : ndarray of shape (edges,)
-        The place of each edge in its ring: that of the point where it begins.
+        The ring that each edge belongs to; of polygons without holes, the polygon.
     """
 
-    def __init__(self, rings: Sequence[FloatArray]) -> None:
-        sizes = list(map(len, rings))
-        self.ends = np.concatenate([np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in rings])
-        self.ring: Indices = np.repeat(np.arange(len(rings)), sizes)
-        self.number: Indices = np.concatenate([np.arange(size) for size in sizes])
+    ends: FloatArray
+    ring: Indices
+
+    @classmethod
+    def of(cls, polygons: Geometries) -> Edges:
+        """All edges, ring by ring."""
+        points, ring = shapely.get_coordinates(shapely.get_rings(polygons), return_index=True)
+        inside = ring[1:] == ring[:-1]
+        return cls(np.stack([points[:-1], points[1:]], axis=1)[inside], ring[:-1][inside])
 
     def __len__(self) -> int:
         return len(self.ends)
 
     def where(self, chosen: Mask) -> Edges:
         """Some of the edges."""
-        some = object.__new__(Edges)
-        some.ends, some.ring, some.number = self.ends[chosen], self.ring[chosen], self.number[chosen]
-        return some
+        return Edges(self.ends[chosen], self.ring[chosen])
 
     def within(self, box: FloatArray) -> Mask:
         """Which edges have a box that meets a box, given as least and greatest x and y."""

@@ -20,6 +20,7 @@ from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray, Variogram
 from oxbow.coordinates import GivenPoint, GivenPolygon, lonlat_of, require_wgs84
+from oxbow.crossings import MOST_PAIRS, TooManyPairs, is_valid
 from oxbow.errors import InvalidMission
 from oxbow.strict_json import decode_json, gathered, utf8
 
@@ -73,7 +74,15 @@ class PriorFeature(msgspec.Struct, frozen=True, kw_only=True):
             raise InvalidMission(f"is a {kind}; expected {', '.join(_GeometryKind)}", where="geometry")
         if self.geometry.is_empty:
             raise InvalidMission(f"is a {kind} without a position", where="geometry")
-        if not self.geometry.is_valid:
+        try:
+            is_sound = is_valid(self.geometry)
+        except TooManyPairs as error:
+            raise InvalidMission(
+                f"is a {kind} with so many long edges beside one another that over {MOST_PAIRS} pairs of them"
+                " would have to be compared; expected shorter edges or fewer points",
+                where="geometry",
+            ) from error
+        if not is_sound:
             reason = shapely.is_valid_reason(self.geometry)
             raise InvalidMission(f"is not a valid {kind} ({reason} in degrees)", where="geometry")
 

@@ -13,6 +13,7 @@ from oxbow import crossings
 from oxbow.crossings import Edges, TooManyPairs, self_contact
 from oxbow.errors import InvalidMission
 from oxbow.mission import parse_mission
+from oxbow.prior import PriorFeature
 from oxbow.site import Site
 
 rings = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=3, max_size=12).map(
@@ -37,7 +38,7 @@ def meet_inside(one, other):
 @settings(deadline=None, max_examples=150, derandomize=True)
 @given(rings.filter(lambda ring: len(ring) > 2), rings.filter(lambda ring: len(ring) > 2))
 def test_meetings_are_those_by_definition(ring, other):
-    edges = Edges([ring, other])
+    edges = Edges.of(np.array([Polygon(ring), Polygon(other)]))
     lines = [LineString(ends) for ends in edges.ends]
     count = len(lines)
     expected = {(i, j) for i in range(count) for j in range(i + 1, count) if meet_inside(lines[i], lines[j])}
@@ -57,9 +58,11 @@ def test_a_ring_has_a_contact_where_it_is_no_valid_polygon(most_pairs, ring):
             contact = self_contact(polygon)
         except TooManyPairs:
             return
-    assert (contact is None) is polygon.is_valid
+        assert (contact is None) is crossings.is_valid(polygon) is polygon.is_valid
     if contact is not None:
-        near = shapely.dwithin([LineString(ends) for ends in Edges([ring]).ends], shapely.Point(contact), 1e-9)
+        near = shapely.dwithin(
+            [LineString(ends) for ends in Edges.of(np.array([polygon])).ends], shapely.Point(contact), 1e-9
+        )
         assert near.sum() >= 2
 
 
@@ -93,6 +96,7 @@ def mission(outline, *zones, field="ForbiddenZones"):
         given_zones = [{"Contour": zone, "Danger": 0.1} for zone in given_zones]
     launch = {"lat": 46.01, "long": 1.0}
     document = {"MissionType": "map", "LaunchPoint": launch, "BoundingBox": positions(outline), field: given_zones}
+    document["Shore_tolerance"] = 1_000.0  # the launch may lie in a zone
     return parse_mission(json.dumps(document).encode())
 
 
@@ -139,3 +143,19 @@ def test_contours_have_a_limit_of_points(monkeypatch):
     monkeypatch.setattr("oxbow.contours.MOST_POINTS", 7)
     with pytest.raises(InvalidMission, match="8 points with its zones; expected at most 7"):
         Site.of(mission(SQUARE, SQUARE / 2))
+
+
+@pytest.mark.parametrize(
+    ("ring", "says"), [(scattered(10_000), "not a valid Polygon"), (leaning(30_000), "pairs of")]
+)
+def test_a_prior_model_is_checked_in_bounded_time(ring, says):
+    with pytest.raises(InvalidMission, match=says):
+        PriorFeature(geometry=Polygon(ring), weight=2.0)
+
+
+def test_an_island_that_touches_the_shore_of_a_large_prior_is_valid():
+    """Within an edge of the shore, of a prior too large to compare all its edges."""
+    angle = np.linspace(0.0, np.pi, 9_000)
+    arch = np.column_stack([np.cos(angle), np.sin(angle).round(9)])
+    touching = Polygon(arch, [[(0.0, 0.0), (0.1, 0.1), (-0.1, 0.1)]])
+    assert PriorFeature(geometry=touching, weight=2.0).geometry.is_valid
