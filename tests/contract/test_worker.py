@@ -7,16 +7,19 @@ import signal
 import threading
 import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 from bus_processes import wait_gone, wait_until
-from echo_stage import SQUARE, Deed, Echo, EchoRequest
+from echo_stage import ECHO, SQUARE, Deed, Echo, EchoRequest
 
 from oxbow import codec
-from oxbow.bus import Envelope
-from oxbow.errors import DeadlineExceeded, ErrorCode, Infeasible, OxbowError
+from oxbow.bus import Bus, Envelope, Session
+from oxbow.bus.router import RouterProcess
+from oxbow.errors import DeadlineExceeded, ErrorCode, Infeasible, Internal, OxbowError
+from oxbow.stage.service import Stage
 from oxbow.stage.watch import is_stopped
 from oxbow.stage.wire import Done, Failed, Job, Shown
 from oxbow.stage.worker import Worker, WorkerLost
@@ -166,3 +169,38 @@ def test_a_process_that_is_stopped_for_a_moment_goes_on(worker: Worker) -> None:
     wait_until(lambda: is_stopped(worker.pid))
     threading.Timer(0.2, os.kill, (worker.pid, signal.SIGCONT)).start()
     assert isinstance(worker.run(job(), ignore), Done)
+
+
+class Faulty(Worker):
+    """Raises what is pending before it runs a job."""
+
+    pending: tuple[BaseException, ...] = ()
+
+    def run(self, job: Job, on_shown: Callable[[Shown], None]) -> Done | Failed:
+        if self.pending:
+            raised, self.pending = self.pending[0], self.pending[1:]
+            raise raised
+        return super().run(job, on_shown)
+
+
+def test_whatever_is_raised_around_a_worker_is_an_answer(
+    router: RouterProcess, bus: Bus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    faulty = Faulty("echo_stage:ECHO", "echo_stage:handle", "faulty", MEMORY_MB)
+    faulty.pending = (OSError("no handles"), SystemExit(1), KeyboardInterrupt(), BaseException("panic"))
+    with Session.connect(router.endpoint) as session:
+        stage = Stage(session, faulty, "faulty", 4, on_failure=lambda: None)
+        same = job(text="at last")
+        for raised in faulty.pending:
+            with pytest.raises(Internal, match=type(raised).__name__):
+                ask(bus, same)
+        assert codec.decode(ask(bus, same), Echo).text == "at last"
+        stage.drain()
+    faulty.close()
+
+
+def ask(bus: Bus, asked: Job) -> bytes:
+    attachment = msgspec.json.encode(asked.envelope)
+    [(_, reply)] = bus.query(ECHO.instance_key("faulty"), asked.payload, timeout_s=20.0, attachment=attachment)
+    return reply
