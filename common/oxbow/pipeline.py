@@ -115,7 +115,8 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
         shore_tolerance_m=mission.shore_tolerance_m,
         least_width_m=mission.least_width_m,
     )
-    with renamed({f"places[{index}]": field for index, field in enumerate(site.ends)}):
+    fields = {f"places[{index}]": field for index, field in enumerate(site.ends)}
+    with renamed(fields | {"least_width_m": "Least_width"}):
         space = call(CONTOUR, contour)
     task = Task(mission, options, site, space, call)
     teams = [

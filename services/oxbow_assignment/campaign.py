@@ -179,7 +179,7 @@ def _leg_warnings(fleet: Fleet) -> Iterator[str]:
         for which, leg in legs.items():
             whose = f"{which} of vehicle {slave.name!r}"
             if not afloat.covers(leg):
-                yield f"{whose}: ashore; the leg of {leg.length:.0f} m is straight, whatever lies there"
+                yield f"{whose}: ashore; the leg of {leg.length:.0f} m leads over land to the nearest water"
             elif len(leg.coords) > 2:
                 yield (
                     f"{whose}: out of sight of the free space; the leg leads {leg.length:.0f} m through water"

@@ -296,3 +296,25 @@ def test_a_sound_path_passes():
     asked: PathRequest = request(WATER, spacings=15, launch=(0.0, 300.0), recovery=(0.0, 301.0))
     require_conforming(LineString([(0, 300), (500, 300), (500, 310), (0, 301)]), asked)
     assert LinearRing(asked.space.free.exterior).is_simple
+
+
+def test_a_ring_that_shows_only_one_side_of_a_corner_is_opened_beside_it():
+    """The nearest place of the ring in sight is the tip of a thorn, of which the entry sees one side."""
+    free = box(-50, -50, 50, 50) - box(-2, -3, -1, 3)
+    region = Polygon([(-9, -20), (-3, 10), (-13, 8), (-13, 40), (40, 40), (40, -20)])
+    launch = access((2.5, 0.0), free, Routes(free, 50.0), where="LaunchPoint")
+    path = joined(region, launch, launch, Passable(free), opening_m=1.0, detail_m=10.0)
+    assert path.is_simple
+
+
+def test_legs_of_two_places_up_one_creek_run_beside_one_another():
+    creek = WATER | box(-200, 300, 1, 306)
+    places = [(-199.0, 303.0), (-100.0, 306.0), (-60.0, 300.0), (-80.0, 307.0), (-200.0, 305.0)]
+    legs = [access(place, FREE, Routes(creek, 50.0), where="LaunchPoint") for place in places]
+    region = REGION | box(10, 290, 100, 316)
+    for launch, recovery in itertools.product(legs, repeat=2):
+        path = joined(region, launch, recovery, Passable(FREE), opening_m=5.0, detail_m=50.0)
+        assert path.is_simple
+        assert (path.coords[0], path.coords[-1]) == (launch.place, recovery.place)
+        land_m = launch.land_m + recovery.land_m
+        assert path.difference(creek.buffer(2e-3)).length <= land_m

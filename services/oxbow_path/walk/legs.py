@@ -10,6 +10,7 @@ enough for them. Here a leg ends on the ring, and the way back opens from nothin
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -39,6 +40,10 @@ OTHER_DETAIL = 0.83
 
 SIGHTS = 200
 """How many places of the ring, nearest first, are tried for one in sight of an entry."""
+
+BESIDE = (0.0, 0.5, -0.5, 1.0, -1.0)
+"""Where the opening's middle is tried, in openings from where the leg meets the ring: beside it, where the leg
+keeps to one bank, or where the ring has a sharp corner of which one side alone is in sight."""
 
 HALVINGS = 12
 """How often the opening of the ring may be halved until the legs fit."""
@@ -261,8 +266,9 @@ def _closed(
     """Out to the ring, round it, and back beside the way out: to the same place, or to another on the way."""
     line = LineString(ring)
     at = _meeting(line, launch.entry, free)
-    round_trip = _part(line, at + opening_m / 2, at - opening_m / 2)
-    for side in (1.0, -1.0):
+    for beside, side in itertools.product(BESIDE, (1.0, -1.0)):
+        middle = at + beside * opening_m
+        round_trip = _part(line, middle + opening_m / 2, middle - opening_m / 2)
         back = _beside(recovery, opening_m, side)[::-1]
         yield _chain(launch.leg[:-1], round_trip, back)
         yield _chain(launch.leg[:-1], round_trip[::-1], back)
@@ -306,6 +312,7 @@ def _open(
     far = _part(line, end + opening_m / 2, start - opening_m)
     way = through.between(near[-1], far[-1])
     yield _chain(launch.leg[:-1], near, way, far[::-1], recovery.leg[-2::-1])
+    yield _chain(launch.leg[:-1], near, way, far[::-1], recovery.leg[::-1])
 
 
 def _without(region: Polygon, line: LineString, half_width_m: float) -> Polygon:
