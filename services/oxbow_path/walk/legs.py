@@ -202,8 +202,7 @@ def joined(
     allowed = launch.beside.union(recovery.beside)
     for _ in range(HALVINGS):
         for path in _candidates(region, launch, recovery, passable, opening_m, detail_m):
-            legs = passable.outside(path)
-            if is_plainly_simple(path) and legs.difference(allowed).length < ROUNDING_M:
+            if is_plainly_simple(path) and _are_legs(passable.outside(path), allowed, launch, recovery):
                 return path
         # Another detail makes another triangulation, whose way may keep clear of what this one touched.
         opening_m, detail_m = opening_m / 2, detail_m * OTHER_DETAIL
@@ -211,6 +210,15 @@ def joined(
         if leg.winds:
             raise Infeasible("is reached only by water too narrow to come back beside the way out", where)
     raise Internal(f"the legs from {launch.place} and to {recovery.place} do not fit the ring", "legs")
+
+
+def _are_legs(outside: BaseGeometry, allowed: BaseGeometry, launch: Access, recovery: Access) -> bool:
+    """Whether what of a path lies outside the free space begins or ends it, and keeps to where legs may run."""
+    parts = shapely.get_parts(shapely.line_merge(outside))
+    parts = parts[shapely.length(parts) > ROUNDING_M]
+    ends = shapely.points([launch.place, recovery.place])
+    begins = shapely.dwithin(parts[:, None], ends[None], ROUNDING_M).any(axis=1)
+    return bool(begins.all()) and outside.difference(allowed).length < ROUNDING_M
 
 
 def is_plainly_simple(path: LineString) -> bool:
