@@ -178,8 +178,9 @@ class Shore:
     def _reach_m(self, path: LineString, unsafe: FloatArray) -> float:
         """How far the leg at a path's start reaches: to the first safe stretch in a basin."""
         reach_m = 0.0
+        open_m = max(OPEN_SHARE * self.safety_m, SHORE_TOLERANCE_M)
         for start_m, end_m in unsafe.tolist():
-            if start_m - reach_m > OPEN_SHARE * self.safety_m and self._is_basin(path, reach_m, start_m):
+            if start_m - reach_m > open_m and self._is_basin(path, reach_m, start_m):
                 break
             reach_m = end_m
         return reach_m
