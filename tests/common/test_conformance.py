@@ -135,6 +135,6 @@ def test_a_ragged_shore_of_many_points_is_judged_as_it_stands():
 @pytest.mark.parametrize("turn_rad", np.linspace(0.01, 3.0, 40))
 def test_rounding_at_the_ends_of_a_path_ends_no_leg(turn_rad):
     """Without a safety distance legs begin exactly at the ends, but for rounding."""
-    path = LineString([(-4.8, 20.3), (30.1, 77.7), (201.7, 33.3), (17.3, 10.1), (-4.8, 20.1)])
+    path = LineString([(-4.8, 20.3), (30.1, 20.3), (201.7, 33.3), (17.3, 10.1), (-4.8, 10.1)])
     water, path = (affinity.rotate(shape, turn_rad, origin=(7, 3), use_radians=True) for shape in (LAKE, path))
     assert not conduct(path, water, 0.0).faults
