@@ -220,7 +220,7 @@ class Shore:
         """
         way = substring(path, *end.stretch)
         parts = shapely.get_parts(way.buffer(OPEN_SHARE * self.safety_m).intersection(self.water))
-        water = parts[np.argmin(shapely.distance(parts, Point(end.place)))]
+        water = parts[np.argmin(shapely.distance(parts, path.interpolate(end.open_m)))]
         start = shapely.get_coordinates(shapely.shortest_line(water, Point(end.place)))[0]
         free = self._free_beside(way)
         basins = [part for part in free if is_basin(part, self.safety_m, self.least_width_m)]

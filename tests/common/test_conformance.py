@@ -138,3 +138,11 @@ def test_rounding_at_the_ends_of_a_path_ends_no_leg(turn_rad):
     path = LineString([(-4.8, 20.3), (30.1, 20.3), (201.7, 33.3), (17.3, 10.1), (-4.8, 10.1)])
     water, path = (affinity.rotate(shape, turn_rad, origin=(7, 3), use_radians=True) for shape in (LAKE, path))
     assert not conduct(path, water, 0.0).faults
+
+
+def test_the_water_of_a_leg_is_that_where_it_ends_though_other_water_is_as_near():
+    """A dock in a zone across a creek: half of the creek leads nowhere."""
+    halves = LAKE | box(-60, 96, 0, 104) | box(-120, 96, -76, 104)
+    path = [(-68.0, 100.0), (50.0, 100.0), (50.0, 150.0)]
+    found = Shore(halves, SAFETY_M).conduct(LineString(path), path[0], path[-1])
+    assert not found.faults
