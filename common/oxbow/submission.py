@@ -14,11 +14,13 @@ import msgspec
 
 from oxbow.contracts import DEFAULT_DEADLINE_S, MOST_DEADLINE_S, checked_id, require_finite
 from oxbow.errors import InvalidMission
+from oxbow.ids import excerpt
 from oxbow.mission import Mission, PlanOptions, mission_json, parse_mission
 
 __all__ = ["Submission", "SubmissionParameters"]
 
 MOST_NAME_CHARACTERS = 48
+MOST_REASON_CHARACTERS = 256
 
 
 class SubmissionParameters(PlanOptions, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -53,9 +55,10 @@ class SubmissionParameters(PlanOptions, frozen=True, kw_only=True, forbid_unknow
         try:
             return msgspec.convert(dict(parameters), cls, strict=False)
         except msgspec.ValidationError as error:
-            given = ";".join(f"{name}={value}" for name, value in parameters.items())
+            given = excerpt(";".join(f"{name}={value}" for name, value in parameters.items()))
             accepted = ", ".join(cls.__struct_fields__)
-            raise InvalidMission(f"{error}, in {given!r}; expected {accepted}", where="parameters") from error
+            reason = str(error)[:MOST_REASON_CHARACTERS]
+            raise InvalidMission(f"{reason}, in {given}; expected {accepted}", where="parameters") from error
 
     @property
     def text(self) -> str:

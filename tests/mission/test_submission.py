@@ -98,7 +98,9 @@ def test_parameters_survive_the_way_through_a_selector(given_parameters: Submiss
         ({"deadline_s": "1e308"}, r"deadline_s: is 1e\+308; expected .* at most 86400"),
         ({"deadline_s": "3e6"}, "deadline_s: is 3000000.0; expected .* at most 86400"),
         ({"time_limit_s": "3e6"}, "time_limit_s: is 3000000.0; expected .* at most 86400"),
-        ({"seed": "1" + 400 * "0"}, "seed"),
+        ({"seed": "1" + 400 * "0"}, "seed: is an integer of 1329 bits"),
+        ({"seed": "1" + 5000 * "0"}, "seed"),
+        ({"x" * 10**6: "1"}, "expected method, seed"),
         ({"seed": "-1"}, "seed: is -1"),
         ({"time_limit_s": "0"}, "time_limit_s: is 0.0"),
         ({"id": "a/b"}, "id: is 'a/b'"),
@@ -106,5 +108,6 @@ def test_parameters_survive_the_way_through_a_selector(given_parameters: Submiss
     ],
 )
 def test_what_is_wrong_with_parameters_is_told(parameters: dict[str, str], message: str) -> None:
-    with pytest.raises(InvalidMission, match=message):
+    with pytest.raises(InvalidMission, match=message) as raised:
         submission(**parameters)
+    assert len(str(raised.value)) < 1000

@@ -35,6 +35,8 @@ MOST_SEED = 2**53
 MOST_LENGTH_M = 1e9
 """More than any vehicle travels: 25 times round the Earth."""
 
+MOST_SHOWN_BITS = 64
+
 FloatArray = npt.NDArray[np.float64]
 Place = tuple[float, float]
 """A planar position (x east, y north) in metres."""
@@ -58,7 +60,14 @@ def require_finite(
         if value is not None and not (least <= value <= most and value > above):
             accepted = f"> {above}" if above > -math.inf else f">= {least}" if least > -math.inf else "any"
             bound = "" if most == sys.float_info.max else f", at most {most:g}"
-            raise InvalidMission(f"is {value!r}; expected a finite number, {accepted}{bound}", where=field)
+            raise InvalidMission(f"is {_shown(value)}; expected a finite number, {accepted}{bound}", where=field)
+
+
+def _shown(value: float) -> str:
+    """A number in an error message; integers may be of any length."""
+    if isinstance(value, int) and value.bit_length() > MOST_SHOWN_BITS:
+        return f"an integer of {value.bit_length()} bits"
+    return repr(value)
 
 
 def require_area(message: Message, *fields: str) -> None:
