@@ -164,5 +164,6 @@ def _member(
         start=locate(names[0], start),
         recovery=locate(names[1], recovery),
         danger_factor=given.danger_factor or 1.0,
+        danger_factors=given.danger_factors or {},
     )
     return Member(vehicle, start, recovery, fields)

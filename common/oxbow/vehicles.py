@@ -22,6 +22,7 @@ _JSON_NAMES = {
     "start": "Start",
     "recovery": "Recovery",
     "danger_factor": "Danger_factor",
+    "danger_factors": "Danger_factors",
 }
 
 
@@ -40,6 +41,8 @@ class GivenVehicle(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES
         Where its path starts and ends; the mission's launch and recovery points where absent.
     danger_factor
         At least 1, which it is where absent: how much less fit it is for water with danger zones.
+    danger_factors
+        The same on the way to and from some hot spots, by the names that plans give them.
     extra
         Fields without a meaning here, kept as they came.
     """
@@ -51,6 +54,7 @@ class GivenVehicle(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES
     start: Position | None = None
     recovery: Position | None = None
     danger_factor: float | None = None
+    danger_factors: dict[str, float] | None = None
     extra: dict[str, Any] = {}
 
 
@@ -81,6 +85,8 @@ def require_distinct(vehicles: Sequence[GivenVehicle]) -> None:
                 raise InvalidMission(
                     f"is {value!r}; expected a finite number > 0", where=f"{where}.{_JSON_NAMES[field]}"
                 )
-        factor = vehicle.danger_factor
-        if factor is not None and not 1.0 <= factor < math.inf:
-            raise InvalidMission(f"is {factor!r}; expected a finite number >= 1", where=f"{where}.Danger_factor")
+        factors = {"Danger_factor": vehicle.danger_factor}
+        factors |= {f"Danger_factors[{spot!r}]": own for spot, own in (vehicle.danger_factors or {}).items()}
+        for field, factor in factors.items():
+            if factor is not None and not 1.0 <= factor < math.inf:
+                raise InvalidMission(f"is {factor!r}; expected a finite number >= 1", where=f"{where}.{field}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from msgspec import structs
 
@@ -59,7 +59,7 @@ def handle(request: AssignRequest, show: Show) -> Assignment:
         treated_share=campaign.treated_share(first, request.swath_m),
         makespan_s=max((sortie.duration_s for sortie in sorties), default=0.0),
         joint_gap=None if solution is None else solution.best_gap.relative,
-        warnings=reply.warnings + campaign.warnings,
+        warnings=(*reply.warnings, *campaign.warnings, *_unknown_spots(request, slaves)),
     )
 
 
@@ -76,6 +76,14 @@ def _shared(request: AssignRequest, show: Show) -> Assignment:
     return Assignment(
         shares=shares, imbalance=sharing.imbalance, dropped=sharing.dropped, warnings=sharing.warnings
     )
+
+
+def _unknown_spots(request: AssignRequest, slaves: Sequence[Vehicle]) -> Iterator[str]:
+    """Danger factors for hot spots that there are not."""
+    names = {spot.name for spot in request.hot_spots}
+    for slave in slaves:
+        for name in sorted(slave.danger_factors.keys() - names):
+            yield f"a danger factor of vehicle {slave.name!r} is for {name!r}, which is no hot spot to be treated"
 
 
 def _with_role(vehicles: Sequence[Vehicle], role: Role) -> tuple[Vehicle, ...]:

@@ -127,6 +127,11 @@ def test_a_vehicle_is_less_fit_for_some_hot_spots():
         assert judged(sortie, zone()).danger == pytest.approx(1.0 - 0.5**crossings)
 
 
+def test_a_factor_for_no_hot_spot_is_a_warning():
+    (warning,) = reply(zone(), vehicles=(boat(danger_factors={"blom": 20.0}),)).warnings
+    assert warning == "a danger factor of vehicle 'boat' is for 'blom', which is no hot spot to be treated"
+
+
 def test_less_fit_between_hot_spots_too():
     """The bar between two hot spots has to be crossed; the reef is gone round by who is unfit."""
     spots = (SPOT, HotSpot(name="west", area=box(250, 295, 310, 305), value=1.0))

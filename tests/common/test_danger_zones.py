@@ -80,6 +80,10 @@ def test_zones_come_to_the_plane_with_their_names():
         ),
         ({"Danger_detour": -1.0}, "Danger_detour: is -1.0; expected a finite number >= 0"),
         (
+            {"Vehicles": [{"Name": "a", "Role": "master", "Danger_factors": {"features[0]": 0.5}}]},
+            "Vehicles[0].Danger_factors['features[0]']: is 0.5; expected a finite number >= 1",
+        ),
+        (
             {"Vehicles": [{"Name": "a", "Role": "master", "Danger_factor": 0.5}]},
             "Vehicles[0].Danger_factor: is 0.5; expected a finite number >= 1",
         ),
@@ -114,7 +118,7 @@ def test_all_that_a_zone_encloses_is_dangerous():
 
 def test_zones_are_written_as_they_came():
     given = [zone(Name="ferry", Per="metre", Colour="red"), zone(0.3, Per="crossing")]
-    boats = [{"Name": "a", "Role": "master", "Danger_factor": 1.5}]
+    boats = [{"Name": "a", "Role": "master", "Danger_factor": 1.5, "Danger_factors": {"features[0]": 3.0}}]
     mission = parsed(DangerZones=given, Danger_detour=250.0, Vehicles=boats)
     written = json.loads(mission_json(mission))
     assert (written["DangerZones"], written["Danger_detour"], written["Vehicles"]) == (given, 250.0, boats)
