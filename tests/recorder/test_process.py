@@ -57,7 +57,7 @@ def show(bus, step, mission="m", run="r", key=None):
 def put(bus, layer, mission="m", run="r", key=None):
     key = key or layer_key(mission, layer.stage, layer.name)
     stamped = Stamped(mission_id=mission, request_id=run, time_s=1.7e9 + layer.step, layer=layer)
-    bus.publish(key, encode(stamped), encoding="application/msgpack", droppable=True)
+    bus.publish(key, encode(stamped), encoding="application/msgpack")
 
 
 def end(bus, mission="m", run="r"):
@@ -65,7 +65,7 @@ def end(bus, mission="m", run="r"):
 
 
 def put_bytes(bus, payload):
-    bus.publish(layer_key("m", "path", "path"), payload, encoding="application/msgpack", droppable=True)
+    bus.publish(layer_key("m", "path", "path"), payload, encoding="application/msgpack")
 
 
 def test_it_finishes_its_files_when_told_to_end(bus, recorder, tmp_path):
