@@ -318,3 +318,16 @@ def test_legs_of_two_places_up_one_creek_run_beside_one_another():
         assert (path.coords[0], path.coords[-1]) == (launch.place, recovery.place)
         land_m = launch.land_m + recovery.land_m
         assert path.difference(creek.buffer(2e-3)).length <= land_m
+
+
+def test_legs_that_meet_at_a_slant_in_a_winding_creek_run_beside_one_another():
+    creek = WATER | LineString([(10, 303), (-60, 306), (-90, 280), (-130, 283), (-160, 250)]).buffer(
+        7, cap_style="flat"
+    )
+    places = [(-160.0, 250.0), (-120.0, 285.0), (-95.0, 276.0), (-140.0, 266.0), (-62.0, 313.0)]
+    legs = [access(place, FREE, Routes(creek, 5.0), where="LaunchPoint") for place in places]
+    region = REGION | box(10, 280, 100, 330)
+    for launch, recovery in itertools.permutations(legs, 2):
+        path = joined(region, launch, recovery, Passable(FREE), opening_m=5.0, detail_m=50.0)
+        assert path.is_simple
+        assert (path.coords[0], path.coords[-1]) == (launch.place, recovery.place)

@@ -84,7 +84,7 @@ class Access:
             return self
         rest = substring(other.line, other.line.project(self.line.interpolate(mine)), other.line.length)
         points = np.vstack([shapely.get_coordinates(substring(self.line, 0.0, mine)), rest.coords])
-        apart = np.hypot(*np.diff(points, axis=0).T) > ROUNDING_M
+        apart = np.hypot(*np.diff(points, axis=0).T) > HAIR_M
         return replace(self, leg=points[np.concatenate([[True], apart])])
 
     def _first_meeting_m(self, other: Access) -> float:
