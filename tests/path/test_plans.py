@@ -143,12 +143,12 @@ def test_a_length_that_small_water_cannot_use_is_told(monkeypatch):
     assert any("the water is small" in warning for warning in plan.warnings)
 
 
-def test_a_launch_point_ashore_is_told():
+def test_a_launch_point_ashore_is_reached_straight_over_land():
     water = box(0, 0, 1000, 800)
-    asked = request(water, launch=(-50.0, 400.0))
-    plan = handle(asked, discard)
-    assert plan.path.coords[0] == (-50.0, 400.0)
-    assert any("ashore" in warning for warning in plan.warnings)
+    plan = handle(request(water, launch=(-50.0, 400.0)), discard)
+    assert plan.path.coords[0] == plan.path.coords[-1] == (-50.0, 400.0)
+    assert plan.path.coords[1] == pytest.approx((0.0, 400.0), abs=0.01)
+    assert plan.path.difference(water).length == pytest.approx(100.0, abs=0.01)
 
 
 def test_a_launch_point_in_water_that_is_left_out_is_refused():
