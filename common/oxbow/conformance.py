@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 import shapely
-from shapely import LineString, MultiPolygon, Point, Polygon, STRtree
+from shapely import LineString, MultiLineString, MultiPolygon, Point, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
@@ -26,7 +26,7 @@ from oxbow.narrows import is_basin, without_narrows
 from oxbow.route.gate_routes import Routes
 from oxbow.tolerances import ROUNDING_M
 
-__all__ = ["Conduct", "Shore", "crossings_of"]
+__all__ = ["Conduct", "Shore", "crossings_of", "strays"]
 
 SHORE_TOLERANCE_M = 0.01
 """A path this near to the shore is on it, and stretches this short are none: degrees of seven decimals are a
@@ -282,6 +282,18 @@ class _Segments:
         ends = np.stack([shapely.get_coordinates(shapely.get_point(parts, at)) for at in (0, -1)], axis=1)
         along = np.hypot(*(ends - self.ends[segment, :1]).transpose(2, 0, 1)) + self.start_m[segment, None]
         return np.asarray(np.sort(along, axis=1))
+
+
+def strays(path: LineString, free: Polygon, launch: Place, recovery: Place) -> list[BaseGeometry]:
+    """The stretches of a path outside a free space that are no legs: they neither begin nor end it."""
+    segments = np.asarray(_Segments.of(path).lines)
+    grown = free.buffer(ROUNDING_M)
+    shapely.prepare(grown)
+    leaving = segments[~shapely.covers(grown, segments)]
+    outside = shapely.get_parts(shapely.line_merge(MultiLineString(list(leaving)).difference(grown)))
+    ends = shapely.points([launch, recovery])
+    is_leg = shapely.dwithin(outside[:, None], ends, ROUNDING_M).any(axis=1)
+    return list(outside[~is_leg & (shapely.length(outside) > ROUNDING_M)])
 
 
 def crossings_of(path: LineString) -> tuple[Fault, ...]:

@@ -15,7 +15,7 @@ from msgspec import structs
 from shapely import LineString, Polygon
 
 from oxbow import codec
-from oxbow.conformance import Shore
+from oxbow.conformance import Shore, strays
 from oxbow.contracts import (
     ASSIGN,
     CERTIFY,
@@ -144,6 +144,9 @@ def _cell_faults(request: DecomposeRequest, reply: Decomposition) -> Iterator[st
 
 def _path_faults(request: PathRequest, reply: PathPlan) -> Iterator[str]:
     yield from _way_faults(reply.path, request.launch, request.recovery, request.length_m)
+    if stray := strays(reply.path, request.space.free, request.launch, request.recovery):
+        place = stray[0].interpolate(0.5, normalized=True)
+        yield f"the path leaves the free space, as at ({place.x:.1f}, {place.y:.1f}), and not as a leg"
 
 
 def _assignment_faults(request: AssignRequest, reply: Assignment) -> Iterator[str]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import shapely
-from shapely import LineString, Point
+from shapely import LineString
 
+from oxbow.conformance import strays
 from oxbow.contracts import PathRequest
 from oxbow.errors import Internal
-from oxbow.tolerances import ROUNDING_M
 
 __all__ = ["require_conforming"]
 
@@ -24,12 +23,7 @@ def require_conforming(path: LineString, request: PathRequest) -> None:
         raise Internal("the planned path crosses itself", "path")
     if path.length > request.length_m:
         raise Internal(f"the planned path is {path.length:.1f} m long, of {request.length_m:.1f} m", "path")
-    outside = shapely.get_parts(path.difference(request.space.free.buffer(ROUNDING_M)))
-    ends = [Point(request.launch), Point(request.recovery)]
-    stray = [
-        line for line in outside if line.length > ROUNDING_M and not any(shapely.dwithin(line, ends, ROUNDING_M))
-    ]
-    if stray:
+    if stray := strays(path, request.space.free, request.launch, request.recovery):
         place = stray[0].interpolate(0.5, normalized=True)
         raise Internal(
             f"the planned path leaves the free space for {sum(line.length for line in stray):.3f} m,"

@@ -8,7 +8,7 @@ import pytest
 import shapely
 from shapely import LineString, affinity
 
-from oxbow.contracts import ASSIGN, CERTIFY, CONTOUR, DECOMPOSE, PATH, Method
+from oxbow.contracts import ASSIGN, CERTIFY, CONTOUR, DECOMPOSE, PATH, Fault, Method, Rule
 from oxbow.errors import Internal
 from oxbow.frame import Frame
 from oxbow.mission import parse_mission
@@ -74,6 +74,13 @@ def through_the_island(_request, reply):
     return replace(reply, path=LineString([xy[0], (x, y - 5), (x + 170, y), (x, y + 5), xy[-1]]))
 
 
+def over_most_of_the_island(_request, reply):
+    """All that is checked of the free space itself is that it holds no zone's middle."""
+    (island,) = reply.free.interiors
+    middle = shapely.Polygon(island).centroid.buffer(2.0, quad_segs=2)
+    return replace(reply, free=shapely.Polygon(reply.free.exterior, [middle.exterior]))
+
+
 def praised(_request, reply):
     """A certificate that finds no fault, of the right request."""
     return replace(reply, faults=(), outside_m=0.0, unsafe_m=0.0, crossings=0, is_simple=True)
@@ -97,6 +104,10 @@ FALSE = {
     "path off the lake": ({PATH.stage: off_the_lake}, "path"),
     "path off the lake, praised": ({PATH.stage: off_the_lake, CERTIFY.stage: praised}, "path"),
     "path through the island, praised": ({PATH.stage: through_the_island, CERTIFY.stage: praised}, "path"),
+    "free space over most of an island, praised": (
+        {CONTOUR.stage: over_most_of_the_island, CERTIFY.stage: praised},
+        "path",
+    ),
     "certificate of another path": (
         {CERTIFY.stage: lambda _, r: replace(r, request_digest="0" * 64)},
         "certificate",
@@ -127,10 +138,12 @@ def test_a_false_share_is_refused(change):
 
 
 def test_the_error_names_the_vehicle_the_place_and_the_metres():
-    lying = Lying(**{PATH.stage: off_the_lake, CERTIFY.stage: praised})
-    fleet = [FLEET[0], FLEET[1] | {"Start": at(380, 180), "Recovery": at(380, 180)}]
-    with pytest.raises(Internal, match=r"a: path: .* m outside the water.*, at lat 46\.00\d+, long 2\.00\d+"):
-        plan_mission(pond(Vehicles=fleet), OPTIONS, call=lying)
+    fault = Fault(rule=Rule.OUTSIDE, metres=3.2, place=(0.0, 0.0), track=1)
+    lying = Lying(**{CERTIFY.stage: lambda _, r: replace(r, faults=(fault,))})
+    with pytest.raises(
+        Internal, match=r"b: path: runs 3\.20 m outside the water, at lat 46\.00\d+, long 2\.00\d+"
+    ):
+        plan_mission(pond(Vehicles=FLEET), OPTIONS, call=lying)
 
 
 def test_the_truth_passes():
