@@ -31,10 +31,10 @@ Stop = Callable[[], bool]
 
 STAGE = "path"
 
-FINEST = 200
+FINEST = 120
 """At most so many spacings make up the root of the water's area."""
 
-FINEST_ALONG = 20_000
+FINEST_ALONG = 10_000
 """At most so many spacings make up the length of the shore: of canals, more than of the root of the area."""
 
 PROBE_PITCH = 0.35

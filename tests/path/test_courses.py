@@ -12,6 +12,7 @@ from oxbow.recording import discard
 from oxbow.route.mesh import Mesh
 from oxbow_path.course.loops import Middles
 from oxbow_path.service import handle
+from oxbow_path.task import FINEST, FINEST_ALONG, finest_spacing_m
 from oxbow_path.walk.probe import Probe
 
 
@@ -101,3 +102,10 @@ def test_a_ragged_lake_one_way_at_any_length():
         spacings = share * 800 / np.sqrt(water.area)
         asked = request(water, spacings=spacings, launch=tuple(ends[0]), recovery=tuple(ends[1]))
         require_sound(handle(asked, discard), asked)
+
+
+def test_the_finest_spacing_of_arms_follows_their_shore():
+    arms = shapely.union_all([affinity.rotate(box(-500, -1, 500, 1), 20.0 * turn) for turn in range(9)])
+    asked = request(arms, spacings=500.0, safety=0.0)
+    assert finest_spacing_m(asked.space) == pytest.approx(arms.length / FINEST_ALONG, rel=0.05)
+    assert finest_spacing_m(asked.space) > np.sqrt(arms.area) / FINEST
