@@ -31,9 +31,9 @@ SHORT_OF = 0.25
 NARROWINGS = 4
 """How often a strip's width is halved until the path crosses it once."""
 
-ROUNDS = 6
+ROUNDS = 3
 
-MOST_AT_ONCE = 400
+MOST_AT_ONCE = 100
 """Of the places far from the path, so many are looked at in one round."""
 
 LEAST_SHARE = 0.002
