@@ -22,7 +22,7 @@ from shapely.ops import substring
 
 from oxbow.contracts import FloatArray, FreeSpace, Place, Vehicle
 from oxbow.errors import Infeasible
-from oxbow.route import Landing, RouteMethod, Router, Routes, make_router, way_to
+from oxbow.route import Landing, RouteMethod, Router, Routes, leg_routes, make_router, way_to
 from oxbow.tolerances import HAIR_M, ON_SHORE_M, ROUNDING_M
 
 __all__ = ["Approach", "Harbour"]
@@ -193,7 +193,7 @@ class Harbour:
 
     def __init__(self, space: FreeSpace, spacing_m: float) -> None:
         self.space = space
-        self._shore = Routes(space.water)
+        self._shore = leg_routes(space.free, space.water)
         self._lanes = [_Lanes(space, self._shore, APART * spacing_m * 0.5**step) for step in range(HALVINGS)]
 
     def approach(self, share: Polygon, vehicle: Vehicle) -> Approach:

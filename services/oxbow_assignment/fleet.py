@@ -20,7 +20,7 @@ from shapely import LineString, Polygon
 from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray, Vehicle
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.route import NO_DANGER, Danger, RouteMethod, Router, Routes, RouteTable, way_to
+from oxbow.route import NO_DANGER, Danger, RouteMethod, Router, RouteTable, leg_routes, way_to
 from oxbow.route.mesh import Mesh
 from oxbow.route.methods import router_on
 from oxbow_assignment.problem import LENGTH
@@ -117,7 +117,7 @@ class Fleet:
         """
         if not slaves:
             raise InvalidMission("has no slave; expected one or more to treat the hot spots", where="vehicles")
-        shore = Routes(water)
+        shore = leg_routes(free, water)
         out = tuple(LineString(way_to(free, shore, slave.start)) for slave in slaves)
         home = tuple(LineString(way_to(free, shore, slave.recovery)[::-1]) for slave in slaves)
         for slave, leg, back in zip(slaves, out, home, strict=True):

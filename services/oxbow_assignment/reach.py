@@ -13,7 +13,7 @@ from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray, Vehicle
 from oxbow.errors import Infeasible
 from oxbow.mesh import Mesh
-from oxbow.route import Routes, lengths_from, way_to
+from oxbow.route import leg_routes, lengths_from, way_to
 
 __all__ = ["Reach"]
 
@@ -60,7 +60,7 @@ class Reach:
         Infeasible
             A vehicle's range does not suffice to see any of the free space and go home; names the vehicle.
         """
-        shore = Routes(free if water is None else water)
+        shore = leg_routes(free, free if water is None else water)
         ways = [
             way_to(free, shore, place)
             for place in (*(each.start for each in vehicles), *(each.recovery for each in vehicles))

@@ -15,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray, FreeSpace, PathRequest, SpacingStep, WeightedArea
 from oxbow.recording import Layer, LayerKind, Show
+from oxbow.route import leg_routes
 from oxbow.route.gate_routes import Routes
 from oxbow.spacing import nominal_spacing_m
 from oxbow.sweep import from_sweep, to_sweep
@@ -194,7 +195,7 @@ def prepared_waters(request: PathRequest, spacing_m: float) -> Waters:
     turn = partial(to_sweep, heading_rad=request.decomposition.heading_rad)
     free, water = (shapely.transform(polygon, turn) for polygon in (request.space.free, request.space.water))
     shapely.prepare([free, water])
-    shore = Routes(water, spacing_m)
+    shore = leg_routes(free, water)
     (launch, recovery) = turn(np.array([request.launch, request.recovery]))
     return Waters(
         spacing_m=spacing_m,

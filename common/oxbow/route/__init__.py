@@ -1,6 +1,6 @@
 """Routes through the water: several methods behind one `Router`."""
 
-from oxbow.route.access import Landing, way_to
+from oxbow.route.access import Landing, leg_routes, way_to
 from oxbow.route.danger import NO_DANGER, Danger
 from oxbow.route.dynamic import DynamicRouter
 from oxbow.route.field import lengths_from
@@ -18,6 +18,7 @@ __all__ = [
     "RouteTable",
     "Router",
     "Routes",
+    "leg_routes",
     "lengths_from",
     "make_router",
     "way_to",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from shapely import Point
+from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import FloatArray, Place
@@ -14,7 +14,13 @@ from oxbow.errors import Infeasible
 from oxbow.route.gate_routes import Routes
 from oxbow.tolerances import ON_SHORE_M, ROUNDING_M
 
-__all__ = ["Landing", "way_to"]
+__all__ = ["Landing", "leg_routes", "way_to"]
+
+DETAIL = 4.0
+"""Gates of narrow water stand no farther apart than so many times the distance from free space to the shore."""
+
+MOST_GATES = 20_000
+"""Of a long shore, gates stand so much farther apart that there are at most about so many."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +69,17 @@ class Landing:
     def onward(self, way: FloatArray) -> FloatArray:
         """A way (n, 2) that begins at the berth, from the place on."""
         return np.vstack([self.place, way if self.is_ashore else way[1:]])
+
+
+def leg_routes(free: BaseGeometry, water: Polygon) -> Routes:
+    """Routes for legs to the free space: fine enough that none begins down a dead end of the creek it leaves.
+
+    Where water is narrower than twice the safety distance, gates stand as close as about twice that width.
+    """
+    clearance_m = float(free.boundary.distance(water.boundary))
+    if clearance_m <= ROUNDING_M:
+        return Routes(water)
+    return Routes(water, max(DETAIL * clearance_m, water.length / MOST_GATES))
 
 
 def way_to(area: BaseGeometry, routes: Routes, place: Place) -> FloatArray:

@@ -38,6 +38,9 @@ OPENING = 0.1
 OTHER_DETAIL = 0.83
 """Change of the detail from one attempt to the next."""
 
+NEAR = 1.0
+"""Places so near to each other, in details of the way through the region, need no way through it."""
+
 SIGHTS = 200
 """How many places of the ring, nearest first, are tried for one in sight of an entry."""
 
@@ -235,6 +238,8 @@ def _candidates(
     if _meet(launch, recovery):
         out, home = launch.along(recovery), recovery.along(launch)
         yield from _closed(region.exterior, out, home, passable.free_and_rounding, opening_m)
+    elif shapely.distance(launch.entry, recovery.entry) <= NEAR * detail_m:
+        yield from _round(region.exterior, launch, recovery, passable.free_and_rounding, opening_m)
     # What the region encloses may be land.
     inside = largest(region.intersection(passable.free))
     if _on(region.exterior, recovery) and not _on(region.exterior, launch):
@@ -280,6 +285,19 @@ def _closed(
         back = _beside(recovery, opening_m, side)[::-1]
         yield _chain(launch.leg[:-1], round_trip, back)
         yield _chain(launch.leg[:-1], round_trip[::-1], back)
+
+
+def _round(
+    ring: LinearRing, launch: Access, recovery: Access, free: BaseGeometry, opening_m: float
+) -> Iterator[LineString]:
+    """Out to the ring, round it the long way, and home from where it comes near to the recovery point."""
+    line = LineString(ring)
+    start, end = (_meeting(line, leg.entry, free) for leg in (launch, recovery))
+    for side in (0.5, -0.5):
+        for onward, back in ((start + side * opening_m, end), (start, end + side * opening_m), (start, end)):
+            for trip in (_part(line, onward, back), _part(line, back, onward)[::-1]):
+                if LineString(trip).length > line.length / 2:
+                    yield _chain(launch.leg, trip, recovery.leg[::-1])
 
 
 def _beside(access: Access, offset_m: float, side: float) -> FloatArray:
