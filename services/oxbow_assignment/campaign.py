@@ -22,9 +22,6 @@ __all__ = ["Campaign", "plan_campaign"]
 NOTED = 0.01
 """Share of a hot spot outside the free space that is worth a warning."""
 
-ON_SHORE_M = 1.0
-"""A leg that leaves the water by no more begins on its shore."""
-
 
 @dataclass(frozen=True)
 class Campaign:
@@ -56,7 +53,7 @@ class Campaign:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What whoever reads the sorties should know."""
-        return (*_leg_warnings(self.fleet), *_outside_warnings(self.treatments))
+        return tuple(_outside_warnings(self.treatments))
 
     def treated_share(self, journeys: Sequence[Journey], swath_m: float) -> tuple[float, ...]:
         """How much of each hot spot's water lies within half a swath of journeys; 0 where there is no water."""
@@ -168,23 +165,6 @@ def _out_of_reach(treatments: Sequence[Treatment], division: Division, fleet: Fl
         value_per_m = share * treatment.spot.value / (nearest.access_m + share * length_m)
         left.append(LeftSpot(hot_spot=treatment.spot.name, value_per_m=value_per_m, reason=reason))
     return left
-
-
-def _leg_warnings(fleet: Fleet) -> Iterator[str]:
-    afloat = fleet.water.buffer(ON_SHORE_M)
-    for slave, out, home in zip(fleet.slaves, fleet.out, fleet.home, strict=True):
-        legs = {"start": out, "recovery": home}
-        if slave.start == slave.recovery:
-            legs = {"start and recovery": out}
-        for which, leg in legs.items():
-            whose = f"{which} of vehicle {slave.name!r}"
-            if not afloat.covers(leg):
-                yield f"{whose}: ashore; the leg of {leg.length:.0f} m leads over land to the nearest water"
-            elif len(leg.coords) > 2:
-                yield (
-                    f"{whose}: out of sight of the free space; the leg leads {leg.length:.0f} m through water"
-                    " nearer to the shore than Safety"
-                )
 
 
 def _outside_warnings(treatments: Sequence[Treatment]) -> Iterator[str]:

@@ -166,10 +166,6 @@ def test_starts_ashore_have_straight_legs():
     require_sound(request, found)
     assert found.sorties[0].path.coords[:2] == [(-50.0, 300.0), (0.0, 300.0)]
     assert found.sorties[0].path.coords[-2:] == [(1_000.0, 300.0), (1_020.0, 300.0)]
-    assert found.warnings == (
-        "start of vehicle 'boat': ashore; the leg of 50 m leads over land to the nearest water",
-        "recovery of vehicle 'boat': ashore; the leg of 20 m leads over land to the nearest water",
-    )
 
 
 def test_what_of_a_hot_spot_lies_on_land_is_told():
