@@ -41,6 +41,9 @@ SAFETY_SHARE = 0.99
 OPEN_SHARE = 2.0
 """A safe stretch shorter than so many safety distances does not end a leg, wherever it is."""
 
+BASIN_SHARE = 1.05
+"""Water farther from the shore than so many safety distances is free, whatever the planner simplified."""
+
 LOOK_SHARE = 4.0
 """So many safety distances of a safe stretch are looked at to tell a basin from a wide spot of a creek."""
 
@@ -189,17 +192,18 @@ class Shore:
         """Whether a safe stretch of a path lies in a basin, as the planner understands it."""
         if self.safety_m == 0.0:
             return True
-        end_m = min(end_m, start_m + LOOK_SHARE * self.safety_m)
-        free = self._free_beside(substring(path, start_m, end_m))
-        nearest = free[np.argmin(shapely.distance(free, path.interpolate((start_m + end_m) / 2)))]
-        return is_basin(nearest, self.safety_m, self.least_width_m)
+        stretch = substring(path, start_m, min(end_m, start_m + LOOK_SHARE * self.safety_m))
+        near_m = 2.0 * (BASIN_SHARE - SAFETY_SHARE) * self.safety_m
+        return bool(shapely.dwithin(self._basins_beside(stretch), stretch, near_m).any())
 
-    def _free_beside(self, way: BaseGeometry) -> Geometries:
-        """The water near a way that is farther from the shore than the safety distance, its parts."""
+    def _basins_beside(self, way: BaseGeometry) -> Geometries:
+        """What is certainly free water near a way, those parts of it that are basins."""
+        distance_m = BASIN_SHARE * self.safety_m
         beside = way.buffer(OPEN_SHARE * self.safety_m)
-        near = self._runs.query(beside, predicate="dwithin", distance=self.safety_m)
-        bands = shapely.buffer(self._runs.geometries[near], SAFETY_SHARE * self.safety_m, quad_segs=QUAD_SEGS)
-        return shapely.get_parts(beside.intersection(self.water).difference(shapely.union_all(bands)))
+        near = self._runs.query(beside, predicate="dwithin", distance=distance_m)
+        bands = shapely.buffer(self._runs.geometries[near], distance_m, quad_segs=QUAD_SEGS)
+        free = shapely.get_parts(beside.intersection(self.water).difference(shapely.union_all(bands)))
+        return free[[is_basin(part, self.safety_m, self.least_width_m) for part in free]]
 
     def _leg(self, end: _End, path: LineString, outside: FloatArray, unsafe: FloatArray) -> Leg:
         """A leg, and what its place makes necessary."""
@@ -222,8 +226,7 @@ class Shore:
         parts = shapely.get_parts(way.buffer(OPEN_SHARE * self.safety_m).intersection(self.water))
         water = parts[np.argmin(shapely.distance(parts, path.interpolate(end.open_m)))]
         start = shapely.get_coordinates(shapely.shortest_line(water, Point(end.place)))[0]
-        free = self._free_beside(way)
-        basins = [part for part in free if is_basin(part, self.safety_m, self.least_width_m)]
+        basins = self._basins_beside(way)
         open_end = path.interpolate(end.open_m).buffer(self.safety_m)
         goal = shapely.union_all([*basins, open_end]).intersection(water)
         if goal.is_empty or goal.covers(Point(start)):

@@ -69,6 +69,12 @@ def test_a_wide_spot_of_a_creek_does_not_end_a_leg_and_a_basin_does(half_width_m
     assert rules(found) == [Rule.UNSAFE] * is_basin
 
 
+@pytest.mark.parametrize("aside_m", [0.0, 0.05, 0.5])
+def test_water_just_as_wide_as_twice_the_safety_distance_is_no_basin(aside_m):
+    water = shapely.union_all([LAKE, box(400, 90, 700, 110)])
+    assert conduct([(695, 100 + aside_m), (380, 100 + aside_m), (380, 20)], water).faults == ()
+
+
 def test_a_leg_along_an_open_shore_is_too_long():
     found = conduct([(5, 5), (5, 195), (50, 150)])
     assert rules(found) == [Rule.UNSAFE]
