@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, TypeVar
 
 import msgspec
 from shapely import Polygon
@@ -21,14 +20,13 @@ from oxbow.contracts import (
     PATH,
     Assignment,
     AssignRequest,
+    Call,
     Certificate,
     CertifyRequest,
     ContourRequest,
     DecomposeRequest,
     Decomposition,
-    Endpoint,
     FreeSpace,
-    Message,
     PathPlan,
     PathRequest,
     Role,
@@ -41,19 +39,7 @@ from oxbow.site import Site
 from oxbow.spacing import nominal_spacing_m
 from oxbow.verification import CheckedCall, require_faultless, require_fit_to_follow
 
-__all__ = ["Call", "expected_calls", "plan_mission"]
-
-Q = TypeVar("Q", bound=Message)
-R = TypeVar("R", bound=Message)
-
-
-class Call(Protocol):
-    """Ask a stage: over the bus (`oxbow.bus.BusCall`) or in this process (`oxbow.local.LocalCall`).
-
-    `part` names the vehicle or the role that is asked about, where a mission has several, for recordings.
-    """
-
-    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /, *, part: str = "") -> R: ...
+__all__ = ["expected_calls", "plan_mission"]
 
 
 @dataclass(frozen=True)

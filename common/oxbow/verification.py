@@ -7,7 +7,7 @@ request; and a path leaves only after it has been judged once more here, on the 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import shapely
@@ -24,6 +24,7 @@ from oxbow.contracts import (
     PATH,
     Assignment,
     AssignRequest,
+    Call,
     Certificate,
     CertifyRequest,
     ContourRequest,
@@ -51,12 +52,6 @@ R = TypeVar("R", bound=Message)
 
 EXACT_M = 10 * ROUNDING_M
 """Places that a reply takes over from its request are as near to them as this."""
-
-
-class Call(Protocol):
-    """As `oxbow.pipeline.Call`."""
-
-    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /, *, part: str = "") -> R: ...
 
 
 class CheckedCall:

@@ -14,11 +14,11 @@ from types import FrameType
 from typing import TypeVar
 
 from oxbow.client import Client
-from oxbow.contracts import Endpoint, Message, MissionStatus
+from oxbow.contracts import Call, Endpoint, Message, MissionStatus
 from oxbow.errors import DeadlineExceeded
 from oxbow.files import move_into_place
 from oxbow.mission import Mission
-from oxbow.pipeline import Call, expected_calls, plan_mission
+from oxbow.pipeline import expected_calls, plan_mission
 from oxbow.plan import PlanOptions
 from oxbow_cli.exits import DEBUG
 from oxbow_cli.interrupts import ending

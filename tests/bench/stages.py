@@ -13,10 +13,10 @@ from bounded import Bounded
 from lakes import lake
 from results import Figure, Section
 
-from oxbow.contracts import STAGES, Endpoint, Message
+from oxbow.contracts import STAGES, Call, Endpoint, Message
 from oxbow.errors import OxbowError
 from oxbow.mission import Mission, mission_json, parse_mission
-from oxbow.pipeline import Call, plan_mission
+from oxbow.pipeline import plan_mission
 from oxbow_cli.local import local_call
 
 __all__ = ["TimedCall", "measure"]

@@ -14,10 +14,9 @@ from echo_stage import ECHO, SQUARE, Deed, EchoRequest, handle
 from oxbow import codec
 from oxbow.bus import Bus, BusCall
 from oxbow.bus.router import RouterProcess
-from oxbow.contracts import ANY_LAYER
+from oxbow.contracts import ANY_LAYER, Call
 from oxbow.errors import Infeasible, InvalidMission, OxbowError
 from oxbow.local import LocalCall
-from oxbow.pipeline import Call
 from oxbow.recording import Layer, Stamped
 
 pytestmark = pytest.mark.processes

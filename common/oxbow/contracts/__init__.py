@@ -58,7 +58,17 @@ from oxbow.contracts.message import (
 )
 from oxbow.contracts.missions import DEFAULT_DEADLINE_S, MOST_DEADLINE_S, MissionState, MissionStatus
 from oxbow.contracts.path import Draw, Method, PathPlan, PathRequest, SpacingStep, WeightedArea
-from oxbow.contracts.stages import ASSIGN, CERTIFY, CONTOUR, DECOMPOSE, MAX_REQUEST_BYTES, PATH, STAGES, Endpoint
+from oxbow.contracts.stages import (
+    ASSIGN,
+    CERTIFY,
+    CONTOUR,
+    DECOMPOSE,
+    MAX_REQUEST_BYTES,
+    PATH,
+    STAGES,
+    Call,
+    Endpoint,
+)
 
 __all__ = [
     "ANY",
@@ -81,6 +91,7 @@ __all__ = [
     "STAGES",
     "AssignRequest",
     "Assignment",
+    "Call",
     "Cell",
     "Certificate",
     "CertifyRequest",

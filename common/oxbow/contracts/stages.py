@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from oxbow.contracts.assignment import Assignment, AssignRequest
 from oxbow.contracts.certificate import Certificate, CertifyRequest
@@ -13,7 +13,7 @@ from oxbow.contracts.keys import PREFIX, checked_id, introspection_key, live_key
 from oxbow.contracts.message import Message
 from oxbow.contracts.path import PathPlan, PathRequest
 
-__all__ = ["ASSIGN", "CERTIFY", "CONTOUR", "DECOMPOSE", "MAX_REQUEST_BYTES", "PATH", "STAGES", "Endpoint"]
+__all__ = ["ASSIGN", "CERTIFY", "CONTOUR", "DECOMPOSE", "MAX_REQUEST_BYTES", "PATH", "STAGES", "Call", "Endpoint"]
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
@@ -40,6 +40,15 @@ class Endpoint(Generic[Q, R]):
     def live_key(self, instance: str) -> str:
         """The liveliness token of one replica."""
         return live_key(self.stage, instance)
+
+
+class Call(Protocol):
+    """Ask a stage: over the bus (`oxbow.bus.BusCall`) or in this process (`oxbow.local.LocalCall`).
+
+    `part` names the vehicle or the role that is asked about, where a mission has several, for recordings.
+    """
+
+    def __call__(self, endpoint: Endpoint[Q, R], request: Q, /, *, part: str = "") -> R: ...
 
 
 CONTOUR: Endpoint[ContourRequest, FreeSpace] = Endpoint("contour", ContourRequest, FreeSpace)
