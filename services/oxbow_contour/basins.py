@@ -42,14 +42,15 @@ def require_reachable(parts: Sequence[Polygon], water: Polygon, request: Contour
     basins = [parts[0], *(part for part in parts[1:] if is_basin(part, safety_m, width_m))]
     if len(basins) == 1:
         return
+    narrow = f"{2 * safety_m:g} m, twice Safety," if 2 * safety_m > width_m else f"{width_m:g} m, Least_width,"
     routes = Routes(water)
     for index, place in enumerate(request.places):
         basin = _first_basin(basins, routes, place)
         if basin is not basins[0]:
             raise Infeasible(
-                f"lies by {basin.area:.0f} m2 of free water that only water narrower than twice Safety ="
-                f" {request.safety_m:g} m connects to the largest part, {basins[0].area:.0f} m2; expected a place"
-                " by the largest part, or a smaller Safety",
+                f"lies by {basin.area:.0f} m2 of free water that only water narrower than {narrow} connects to"
+                f" the largest part, {basins[0].area:.0f} m2; expected a place by the largest part, or a smaller"
+                " Safety",
                 where=f"places[{index}]",
             )
 

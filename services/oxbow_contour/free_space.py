@@ -14,7 +14,7 @@ from oxbow_contour.erosion import erode
 from oxbow_contour.simplification import Simplified, simplify
 from oxbow_contour.verification import inscribed_radius_m, is_safe, rounded_down
 
-__all__ = ["Eroded", "default_tolerance_m", "erode_water"]
+__all__ = ["MANY_POINTS", "Eroded", "default_tolerance_m", "erode_water"]
 
 REACH = 0.25
 """How far, in spacings, water that erosion may leave can be from the free space; farther, it is an arm lost."""
@@ -126,8 +126,7 @@ def _closes_arms(simplified: Simplified, free: Polygon, safety_m: float, spacing
     least_m = safety_m - simplified.tolerance_m
     outer = erode(simplified.parts, least_m) if least_m > 0 else simplified.parts
     largest = max(outer, key=shapely.area)
-    shapely.prepare(free)
-    return not shapely.dwithin(free, shapely.points(shapely.get_coordinates(largest)), REACH * spacing_m).all()
+    return not free.buffer(REACH * spacing_m).covers(largest)
 
 
 def _require_room(water: Sequence[Polygon], safety_m: float, *, is_certain: bool) -> None:

@@ -12,7 +12,7 @@ from oxbow.errors import Infeasible
 from oxbow.narrows import is_basin, without_narrows
 from oxbow.recording import Layer, LayerKind, Show
 from oxbow_contour.basins import require_reachable
-from oxbow_contour.free_space import Eroded, erode_water
+from oxbow_contour.free_space import MANY_POINTS, Eroded, erode_water
 from oxbow_contour.home import home_water
 from oxbow_contour.water import true_water
 
@@ -46,8 +46,7 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
             where="least_width_m",
         )
     home = home_water(waters, request)
-    eroded = erode_water([home], request.safety_m, request.spacing_m, request.tolerance_m)
-    require_reachable(eroded.parts, home, request)
+    eroded = _eroded(home, request)
     free, *others = eroded.parts
     shapely.prepare(home)
     dropped = (*_other_waters(waters, home, request), *(_dropped(part, OTHER_PART) for part in others))
@@ -60,6 +59,20 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
         dropped=dropped,
         warnings=(*eroded.warnings, *_narrow(water, opened, request), *_summary(dropped)),
     )
+
+
+def _eroded(home: Polygon, request: ContourRequest) -> Eroded:
+    """The free space of the water that is planned on, within reach of every place."""
+    eroded = erode_water([home], request.safety_m, request.spacing_m, request.tolerance_m)
+    try:
+        require_reachable(eroded.parts, home, request)
+    except Infeasible:
+        # Simplification may have closed what the safety distance leaves open.
+        if eroded.simplified.tolerance_m == 0.0 or shapely.get_num_coordinates(home) > MANY_POINTS:
+            raise
+        eroded = erode_water([home], request.safety_m, request.spacing_m, tolerance_m=0.0)
+        require_reachable(eroded.parts, home, request)
+    return eroded
 
 
 def _other_waters(waters: Sequence[Polygon], home: Polygon, request: ContourRequest) -> Iterator[DroppedPart]:

@@ -127,3 +127,11 @@ def test_water_without_narrows_is_left_as_it_is():
 @pytest.mark.parametrize(("part", "is_one"), [(Point(0, 0).buffer(1.9), False), (box(0, 0, 1, 5), True)])
 def test_a_wide_spot_fits_into_a_circle_as_wide_as_the_safety_distance(part, is_one):
     assert is_basin(part, 4.0, 0.1) is is_one
+
+
+def test_simplification_closes_no_passage_that_a_place_needs():
+    """The harbour is small beside the spacing, so that its loss would be taken for a strip along the shore."""
+    harbour = [box(60, 0, 62, 20), box(62, 18, 75, 20), box(75.6, 18, 100, 20)]
+    found = space((80.0, 10.0), zones=harbour, safety_m=0.0, spacing_m=200.0)
+    assert found.free.covers(Point(80.0, 10.0))
+    assert found.free.area > 9_000
