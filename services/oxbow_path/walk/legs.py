@@ -283,8 +283,11 @@ def _closed(
         middle = at + beside * opening_m
         round_trip = _part(line, middle + opening_m / 2, middle - opening_m / 2)
         back = _beside(recovery, opening_m, side)[::-1]
-        yield _chain(launch.leg[:-1], round_trip, back)
-        yield _chain(launch.leg[:-1], round_trip[::-1], back)
+        for trip in (round_trip, round_trip[::-1]):
+            yield _chain(launch.leg[:-1], trip, back)
+            if not _on(ring, launch):
+                # The ring is farther away: between it and the entry, the ways run beside one another.
+                yield _chain(launch.leg, trip, _aside(launch.leg[-1], trip[-1], side * opening_m / 2), back)
 
 
 def _round(
@@ -298,6 +301,12 @@ def _round(
             for trip in (_part(line, onward, back), _part(line, back, onward)[::-1]):
                 if LineString(trip).length > line.length / 2:
                     yield _chain(launch.leg, trip, recovery.leg[::-1])
+
+
+def _aside(place: FloatArray, towards: FloatArray, offset_m: float) -> FloatArray:
+    """A place (1, 2) moved to the left of the way to another."""
+    east, north = (towards - place) / np.hypot(*(towards - place))
+    return np.asarray(place + offset_m * np.array([[-north, east]]))
 
 
 def _beside(access: Access, offset_m: float, side: float) -> FloatArray:
