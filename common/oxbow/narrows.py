@@ -15,6 +15,10 @@ SURPLUS = 1e-2
 """What is dilated again is dilated by so much more, as a share: the shore is kept, not redrawn beside itself."""
 
 
+THIN = 0.25
+"""Free water thinner on average than this share of the least width is no basin."""
+
+
 def without_narrows(water: Polygon | MultiPolygon, width_m: float) -> MultiPolygon:
     """The water that a disc of this width can be moved about in: its opening, with the shore as it was.
 
@@ -52,9 +56,11 @@ def is_basin(part: Polygon, safety_m: float, width_m: float) -> bool:
     """Whether a connected part of the free space is a basin, not a wide spot of a narrow water.
 
     A wide spot fits into a circle as wide as the safety distance: a leg through narrow water may pass it. No leg
-    may pass a basin, whose own free water lies nearer.
+    may pass a basin, whose own free water lies nearer. A thin strip of free water is what rounding leaves of a
+    water just as wide as twice the safety distance.
     """
-    return float(shapely.minimum_bounding_radius(part)) > max(safety_m, width_m) / 2
+    radius_m = float(shapely.minimum_bounding_radius(part))
+    return radius_m > max(safety_m, width_m) / 2 and part.area > THIN * width_m * 2.0 * radius_m
 
 
 def _rings(water: Polygon | MultiPolygon) -> tuple[int, int]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import shapely
+from msgspec import structs
 from shapely import MultiPolygon, Polygon
 
 from oxbow.contracts import ContourRequest, DroppedPart, FreeSpace
@@ -17,6 +18,9 @@ from oxbow_contour.home import home_water
 from oxbow_contour.water import true_water
 
 __all__ = ["handle"]
+
+MOSTLY = 0.5
+"""Where a smaller share of the water is free, the scale of detail is that of the free space."""
 
 LEAST_LOST_M2 = 0.01
 """Less narrow water than this is not worth a figure."""
@@ -46,7 +50,7 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
             where="least_width_m",
         )
     home = home_water(waters, request)
-    eroded = _eroded(home, request)
+    eroded = _free_space(home, request, water.area)
     free, *others = eroded.parts
     shapely.prepare(home)
     dropped = (*_other_waters(waters, home, request), *(_dropped(part, OTHER_PART) for part in others))
@@ -59,6 +63,18 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
         dropped=dropped,
         warnings=(*eroded.warnings, *_narrow(water, opened, request), *_summary(dropped)),
     )
+
+
+def _free_space(home: Polygon, request: ContourRequest, area_m2: float) -> Eroded:
+    """The free space, at the scale of detail that the length gives there.
+
+    The nominal spacing is that of all the water. Where little of it is free, that is too coarse.
+    """
+    eroded = _eroded(home, request)
+    share = eroded.parts[0].area / area_m2
+    if share >= MOSTLY:
+        return eroded
+    return _eroded(home, structs.replace(request, spacing_m=share * request.spacing_m))
 
 
 def _eroded(home: Polygon, request: ContourRequest) -> Eroded:
