@@ -24,6 +24,7 @@ def improved(path: Polyline, task: Task, display: Display) -> LineString:
         task.samples,
         length_m=max(path.length_m, task.useful_length_m) if fits else task.useful_length_m,
         spacing_m=task.spacing_m,
+        enough_m=task.enough_m,
         stop=task.stop,
         watch=display.refinement,
     )

@@ -33,7 +33,7 @@ Stop = Callable[[], bool]
 STAGE = "path"
 
 FINEST = 120
-"""At most so many spacings make up the root of the water's area."""
+"""At most so many spacings make up the root of the water's area: waypoints, and the work, grow with its square."""
 
 FINEST_ALONG = 10_000
 """At most so many spacings make up the length of the shore: of canals, more than of the root of the area."""
@@ -53,7 +53,7 @@ FINEST_M = 0.1
 GATES_ALONG = 15_000
 """Routes pass the water through about so many gates at most."""
 
-MOST_SAMPLES = 250_000
+MOST_SAMPLES = 100_000
 """Of more samples, or places of the probe, than about these, the pitch is widened."""
 
 
@@ -101,6 +101,11 @@ class Task:
     def useful_length_m(self) -> float:
         """The length that is worth travelling: what the least spacing asks for, or the longest there may be."""
         return min(self.budget.most_m, self.waters.free.area / self.spacing_m)
+
+    @property
+    def enough_m(self) -> float:
+        """So near to all water, a path need come no nearer: half the least spacing, or 0 where length is short."""
+        return self.spacing_m / 2 if self.spacing_m <= self.budget.least_spacing_m else 0.0
 
     @cached_property
     def areas(self) -> tuple[WeightedArea, ...]:

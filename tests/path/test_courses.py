@@ -109,3 +109,14 @@ def test_the_finest_spacing_of_arms_follows_their_shore():
     asked = request(arms, spacings=500.0, safety=0.0)
     assert finest_spacing_m(asked.space) == pytest.approx(arms.length / FINEST_ALONG, rel=0.05)
     assert finest_spacing_m(asked.space) > np.sqrt(arms.area) / FINEST
+
+
+@pytest.mark.parametrize("method", list(Method))
+def test_water_narrower_than_the_least_spacing_is_walked_once_round(method):
+    canal = affinity.rotate(box(0, 0, 500, 0.08), 20.0, origin=(0, 0))
+    home = shapely.get_coordinates(affinity.rotate(Point(2, 0.04), 20.0, origin=(0, 0)))[0]
+    asked = request(canal, spacings=2000 / np.sqrt(canal.area), safety=0.0, launch=tuple(home), method=method)
+    plan = handle(asked, discard)
+    require_sound(plan, asked, least_share=0.45)
+    assert farthest_m(plan, asked) <= 0.1
+    assert len(plan.path.coords) <= 1000

@@ -213,6 +213,34 @@ def test_no_time_leaves_the_path_as_it_was():
     assert path.equals(MEANDER)
 
 
+def test_a_path_near_enough_to_all_water_is_left_as_it_is():
+    samples = Samples.over(SQUARE, 30.0)
+    farthest_m = shapely.distance(MEANDER, shapely.points(samples.points)).max()
+    for enough_m, is_left in ((1.01 * farthest_m, True), (0.99 * farthest_m, False)):
+        path = refined(
+            Polyline.of(MEANDER, SQUARE),
+            SQUARE,
+            samples,
+            length_m=1.5 * MEANDER.length,
+            spacing_m=150.0,
+            enough_m=enough_m,
+            stop=never,
+            watch=unseen,
+        )
+        assert (path.length == pytest.approx(MEANDER.length)) is is_left
+
+
+@pytest.mark.parametrize("share", [0.1, 0.9])
+def test_moves_keep_the_segments_that_stay(share):
+    path = Polyline.of(MEANDER, SQUARE).divided(20.0)
+    rng = np.random.default_rng(0)
+    moves = np.where(rng.random((len(path.nodes), 1)) < share, 1.0, 0.0)
+    assert len(path.segments) == len(path.legs)
+    moved = path.moved(path.nodes + moves)
+    afresh = shapely.linestrings(np.stack([moved.nodes[:-1], moved.nodes[1:]], axis=1))
+    assert shapely.equals_exact(moved.segments, afresh).all()
+
+
 def test_rigid_segments_stay_straight():
     spacing_m = SQUARE.area / MEANDER.length
     across, along = np.abs(np.diff(shapely.get_coordinates(MEANDER), axis=0)).T

@@ -17,8 +17,9 @@ from oxbow_path.course.loops import Middles
 from oxbow_path.improvement import improved
 from oxbow_path.refinement import Polyline
 from oxbow_path.task import Display, MethodPlan, PathMethod, Task
+from oxbow_path.transect import try_transects
 from oxbow_path.walk.legs import joined
-from oxbow_path.walk.trial import CUT
+from oxbow_path.walk.trial import CUT, Pattern
 
 __all__ = ["best_plan"]
 
@@ -29,6 +30,9 @@ REACH = 0.5
 """Water nearer to the course than this, in spacings, needs no detour."""
 
 EVENNESS_QUANTILE = 0.95
+
+GOOD = 1.6
+"""A course whose `_score_m` is no more spacings than this is taken at once: no method does much better."""
 
 
 def best_plan(method: PathMethod, task: Task, display: Display) -> MethodPlan:
@@ -41,14 +45,14 @@ def best_plan(method: PathMethod, task: Task, display: Display) -> MethodPlan:
     """
     courses = list(_courses(task))
     fitting = [course for course in courses if task.budget.fits(course.length)]
-    plans = []
+    plans = [_along(fitting, task, display)] if fitting else []
+    if plans and _score_m(plans[0].path, task) <= GOOD * task.spacing_m:
+        return plans[0]
     try:
         plans.append(method(task, display))
     except Infeasible as refusal:
-        if not fitting:
+        if not plans:
             raise _too_short(task, courses) or refusal from None
-    if fitting and not (plans and task.stop()):
-        plans.append(_along(fitting, task, display))
     return min(plans, key=lambda plan: _score_m(plan.path, task))
 
 
@@ -83,8 +87,12 @@ def _score_m(path: LineString, task: Task) -> float:
 
 
 def _courses(task: Task) -> Iterator[LineString]:
-    """Courses from launch to recovery that a walk round a tree cannot make."""
+    """Courses from launch to recovery that a walk round a tree cannot make, or no method need make otherwise."""
     waters = task.waters
+    if waters.free.area <= task.enough_m * waters.free.length:
+        # Water whose mean width is no more than the least spacing has no room for a pattern: a walk that leaves no
+        # gap of half the least spacing is enough.
+        yield try_transects(waters, Pattern(task.enough_m)).path
     if waters.launch.place != waters.recovery.place:
         way = _shortest_way(task)
         if task.budget.limit_m < WAYS * way.length and way.is_simple:

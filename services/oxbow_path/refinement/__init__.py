@@ -2,8 +2,18 @@
 
 from oxbow_path.refinement.guard import Guard
 from oxbow_path.refinement.polyline import Polyline
-from oxbow_path.refinement.refine import RefinementStep, Stop, refined
+from oxbow_path.refinement.refine import NODE_WORK, RefinementStep, Stop, refined
 from oxbow_path.refinement.samples import Samples, weights_at
 from oxbow_path.refinement.smoothing import smoothed
 
-__all__ = ["Guard", "Polyline", "RefinementStep", "Samples", "Stop", "refined", "smoothed", "weights_at"]
+__all__ = [
+    "NODE_WORK",
+    "Guard",
+    "Polyline",
+    "RefinementStep",
+    "Samples",
+    "Stop",
+    "refined",
+    "smoothed",
+    "weights_at",
+]

@@ -92,8 +92,9 @@ class Guard:
         step = np.where(path.pinned[:, None], 0.0, target - path.nodes)
         share = np.ones(len(path.nodes))
         suspect: Mask | None = None
+        moved = path
         for turn in range(ROUNDS):
-            moved = path.moved(path.nodes + share[:, None] * step)
+            moved = moved.moved(path.nodes + share[:, None] * step)
             fault = self.faults(moved, suspect, excused)
             if not fault.any():
                 return moved

@@ -74,8 +74,15 @@ class Polyline:
         return _segments(self.nodes)
 
     def moved(self, nodes: FloatArray) -> Polyline:
-        """The same nodes elsewhere."""
-        return Polyline(nodes, self.pinned, self.legs, self.rigid)
+        """The same nodes elsewhere; the lines of segments that stay are kept, since making them takes long."""
+        moved = Polyline(nodes, self.pinned, self.legs, self.rigid)
+        elsewhere = (nodes != self.nodes).any(axis=1)
+        changed = np.flatnonzero(elsewhere[:-1] | elsewhere[1:])
+        if "segments" in self.__dict__ and len(changed) < len(self.legs) / 2:
+            segments = self.segments.copy()
+            segments[changed] = shapely.linestrings(np.stack([nodes[changed], nodes[changed + 1]], axis=1))
+            moved.__dict__["segments"] = segments
+        return moved
 
     def divided(self, most_m: float) -> Polyline:
         """With nodes added so that no segment is longer than `most_m`, but for legs and rigid ones."""

@@ -15,7 +15,7 @@ from oxbow_path.refinement.polyline import Polyline
 from oxbow_path.refinement.pull import Pull, feet
 from oxbow_path.refinement.samples import Samples
 
-__all__ = ["RefinementStep", "Stop", "refined"]
+__all__ = ["NODE_WORK", "RefinementStep", "Stop", "refined"]
 
 Stop = Callable[[], bool]
 """Asked before each step whether time is up."""
@@ -24,7 +24,10 @@ STEPS = (15, 60)
 """Fewest and most steps."""
 
 WORK = 7_000_000
-"""Steps times samples: about so many seconds' worth of a millionth each."""
+"""Steps times samples, and nodes: about so many seconds' worth of a millionth each."""
+
+NODE_WORK = 15
+"""A node takes as long as so many samples."""
 
 POWERS = (4.0, 16.0)
 """The power of the distance whose sum is minimised: first the mean counts, at last the largest."""
@@ -72,6 +75,7 @@ def refined(
     *,
     length_m: float,
     spacing_m: float,
+    enough_m: float = 0.0,
     stop: Stop,
     watch: Callable[[int, RefinementStep], None],
 ) -> LineString:
@@ -95,6 +99,8 @@ def refined(
         The longest path allowed.
     spacing_m
         The nominal spacing, area / length.
+    enough_m
+        A path so near to all samples, and no longer than allowed, is not refined further.
     stop
         Asked before each step whether time is up; a path still too long goes on. Without a limit the number of
         steps is fixed by the samples.
@@ -109,9 +115,13 @@ def refined(
     states = _states(path, Guard.of(free, path, spacing_m), samples, length_m, spacing_m, stop)
     best = next(states)
     watch(0, best)
+    if _is_enough(best, enough_m, length_m):
+        return path.line
     for number, state in enumerate(states, start=1):
         watch(number, state)
         best = _better(state, best, length_m)
+        if _is_enough(best, enough_m, length_m):
+            break
     return best.path
 
 
@@ -119,7 +129,7 @@ def _states(
     path: Polyline, guard: Guard, samples: Samples, length_m: float, spacing_m: float, stop: Stop
 ) -> Iterator[RefinementStep]:
     """The given path, and the path after each step."""
-    last = int(np.clip(WORK // len(samples), *STEPS))
+    last = int(np.clip(WORK // (len(samples) + NODE_WORK * len(path.nodes)), *STEPS))
     tension, aim_m = None, AIM * length_m
     for number in range(last + 1):
         path = guard.thinned(path, path.crowded(2 * SHORTEST * spacing_m)).divided(LONGEST * spacing_m)
@@ -142,6 +152,10 @@ def _states(
 def _state(path: Polyline, weighed_m: FloatArray) -> RefinementStep:
     p95_m = float(np.quantile(weighed_m, EVENNESS_QUANTILE))
     return RefinementStep(path.line, path.length_m, float(weighed_m.max()), p95_m)
+
+
+def _is_enough(state: RefinementStep, enough_m: float, length_m: float) -> bool:
+    return state.largest_m <= enough_m and state.length_m <= length_m
 
 
 def _better(state: RefinementStep, best: RefinementStep, length_m: float) -> RefinementStep:

@@ -13,7 +13,7 @@ from oxbow.contracts import FloatArray
 from oxbow_path.refinement.guard import Guard
 from oxbow_path.refinement.polyline import Polyline
 
-__all__ = ["Epoch", "Schedule", "organised"]
+__all__ = ["NODES_PER_SPACING", "Epoch", "Schedule", "organised"]
 
 NODES_PER_SPACING = 1.8
 """Nodes of the first ring, per spacing of the longest path."""

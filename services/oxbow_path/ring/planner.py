@@ -9,9 +9,9 @@ import numpy as np
 from oxbow.contracts import SpacingStep
 from oxbow.errors import Infeasible
 from oxbow_path.improvement import improved
-from oxbow_path.refinement import Guard, Polyline, weights_at
+from oxbow_path.refinement import NODE_WORK, Guard, Polyline, weights_at
 from oxbow_path.ring.draws import drawn_places
-from oxbow_path.ring.kohonen import Epoch, Schedule, organised
+from oxbow_path.ring.kohonen import NODES_PER_SPACING, Epoch, Schedule, organised
 from oxbow_path.task import SHOWN_EVERY, Display, MethodPlan, Task
 from oxbow_path.transect import try_transects
 from oxbow_path.walk.remainder import with_remainder
@@ -31,7 +31,7 @@ EPOCHS = (8, 30)
 """Fewest and most updates of the ring."""
 
 WORK = 3_000_000
-"""Updates times draws: very long paths get fewer updates."""
+"""Updates times draws, and nodes: very long paths get fewer updates."""
 
 REACH_NAMED = 2.0
 """Water farther from the path than so many half spacings is named as dropped."""
@@ -84,6 +84,7 @@ def _start(task: Task) -> Trial:
 def _epochs(ring: Polyline, task: Task) -> Iterator[Epoch]:
     request = task.request
     count = len(task.samples)
+    work = count + NODE_WORK * NODES_PER_SPACING * task.useful_length_m / task.spacing_m
     draws = drawn_places(task.waters.cells, count, seed=request.seed, draw=request.draw)
     return organised(
         ring,
@@ -92,6 +93,6 @@ def _epochs(ring: Polyline, task: Task) -> Iterator[Epoch]:
         Guard.of(task.waters.free, ring, task.spacing_m),
         length_m=task.useful_length_m,
         spacing_m=task.spacing_m,
-        schedule=Schedule(int(np.clip(WORK // count, *EPOCHS))),
+        schedule=Schedule(int(np.clip(WORK // work, *EPOCHS))),
         stop=task.stop,
     )
