@@ -12,9 +12,11 @@ from shapely import LinearRing, LineString, Point, Polygon, box
 
 from oxbow.contracts import PathRequest
 from oxbow.errors import Infeasible, Internal
+from oxbow.recording import discard
 from oxbow.reeb import cell_polygon
 from oxbow.route.gate_routes import Routes, taut
 from oxbow_path.conformance import require_conforming
+from oxbow_path.service import handle
 from oxbow_path.task import prepared_waters
 from oxbow_path.transect.circuit import plan_circuit
 from oxbow_path.transect.pattern import try_transects
@@ -331,3 +333,21 @@ def test_legs_that_meet_at_a_slant_in_a_winding_creek_run_beside_one_another():
         path = joined(region, launch, recovery, Passable(FREE), opening_m=5.0, detail_m=50.0)
         assert path.is_simple
         assert (path.coords[0], path.coords[-1]) == (launch.place, recovery.place)
+
+
+@pytest.mark.parametrize("recovery", [(150.0, 41.0), (150.0, 59.0)], ids=["on one bank", "across"])
+def test_places_near_to_each_other_leave_no_side_of_the_ring_out(recovery):
+    water = shapely.union_all([box(0, 0, 100, 100), box(100, 40, 200, 60), box(200, 0, 300, 100)])
+    asked = request(water, launch=(148.0, 41.0), recovery=recovery, spacings=6.0)
+    plan = handle(asked, discard)
+    assert plan.path.intersects(box(20, 20, 80, 80))
+    assert plan.path.intersects(box(220, 20, 280, 80))
+
+
+def test_a_leg_reaches_a_ring_that_is_farther_away_than_its_entry():
+    """From a corner of an islet that the ring is led round at a distance."""
+    islet = shapely.Point(500, 400).buffer(25, quad_segs=3)
+    water = box(0, 0, 1000, 800).difference(islet).buffer(0)
+    launch = islet.exterior.coords[1]
+    plan = handle(request(water, launch=launch, spacings=2.8, safety=0.0035), discard)
+    assert plan.path.is_simple

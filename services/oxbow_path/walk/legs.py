@@ -41,6 +41,9 @@ OTHER_DETAIL = 0.83
 NEAR = 1.0
 """Places so near to each other, in details of the way through the region, need no way through it."""
 
+SKIPPED = 2.0
+"""So much of the ring, in the same measure, may lie between them and not be travelled."""
+
 SIGHTS = 200
 """How many places of the ring, nearest first, are tried for one in sight of an entry."""
 
@@ -239,7 +242,8 @@ def _candidates(
         out, home = launch.along(recovery), recovery.along(launch)
         yield from _closed(region.exterior, out, home, passable.free_and_rounding, opening_m)
     elif shapely.distance(launch.entry, recovery.entry) <= NEAR * detail_m:
-        yield from _round(region.exterior, launch, recovery, passable.free_and_rounding, opening_m)
+        skipped_m = SKIPPED * detail_m
+        yield from _round(region.exterior, launch, recovery, passable.free_and_rounding, opening_m, skipped_m)
     # What the region encloses may be land.
     inside = largest(region.intersection(passable.free))
     if _on(region.exterior, recovery) and not _on(region.exterior, launch):
@@ -291,15 +295,23 @@ def _closed(
 
 
 def _round(
-    ring: LinearRing, launch: Access, recovery: Access, free: BaseGeometry, opening_m: float
+    ring: LinearRing,
+    launch: Access,
+    recovery: Access,
+    free: BaseGeometry,
+    opening_m: float,
+    skipped_m: float,
 ) -> Iterator[LineString]:
-    """Out to the ring, round it the long way, and home from where it comes near to the recovery point."""
+    """Out to the ring, round nearly all of it, and home from where it comes near to the recovery point.
+
+    Places on two banks of a canal are near, too; but between them lies half the ring.
+    """
     line = LineString(ring)
     start, end = (_meeting(line, leg.entry, free) for leg in (launch, recovery))
     for side in (0.5, -0.5):
         for onward, back in ((start + side * opening_m, end), (start, end + side * opening_m), (start, end)):
             for trip in (_part(line, onward, back), _part(line, back, onward)[::-1]):
-                if LineString(trip).length > line.length / 2:
+                if LineString(trip).length >= line.length - skipped_m:
                     yield _chain(launch.leg, trip, recovery.leg[::-1])
 
 
