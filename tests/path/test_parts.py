@@ -335,13 +335,22 @@ def test_legs_that_meet_at_a_slant_in_a_winding_creek_run_beside_one_another():
         assert (path.coords[0], path.coords[-1]) == (launch.place, recovery.place)
 
 
-@pytest.mark.parametrize("recovery", [(150.0, 41.0), (150.0, 59.0)], ids=["on one bank", "across"])
+@pytest.mark.parametrize("recovery", [(460.0, 140.0), (450.0, 160.0)], ids=["on one bank", "across"])
 def test_places_near_to_each_other_leave_no_side_of_the_ring_out(recovery):
-    water = shapely.union_all([box(0, 0, 100, 100), box(100, 40, 200, 60), box(200, 0, 300, 100)])
-    asked = request(water, launch=(148.0, 41.0), recovery=recovery, spacings=6.0)
+    water = shapely.union_all([box(0, 0, 300, 300), box(300, 140, 600, 160), box(600, 0, 900, 300)])
+    asked = request(water, launch=(450.0, 140.0), recovery=recovery, spacings=16.0, safety=0.0209)
     plan = handle(asked, discard)
-    assert plan.path.intersects(box(20, 20, 80, 80))
-    assert plan.path.intersects(box(220, 20, 280, 80))
+    assert plan.path.intersects(box(20, 20, 280, 280))
+    assert plan.path.intersects(box(620, 20, 880, 280))
+
+
+def test_the_shortest_way_is_a_plan_whatever_the_method_finds():
+    """From an islet to the shore, with less length than a walk round the water's edge takes."""
+    islet = Point(500, 400).buffer(25, quad_segs=3)
+    water = box(0, 0, 1000, 800).difference(islet)
+    asked = request(water, launch=islet.exterior.coords[1], recovery=(700.0, 0.0), spacings=2.0, safety=0.0)
+    plan = handle(asked, discard)
+    assert plan.path.length <= asked.length_m
 
 
 def test_a_leg_reaches_a_ring_that_is_farther_away_than_its_entry():

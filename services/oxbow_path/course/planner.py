@@ -52,8 +52,26 @@ def best_plan(method: PathMethod, task: Task, display: Display) -> MethodPlan:
         plans.append(method(task, display))
     except Infeasible as refusal:
         if not plans:
-            raise _too_short(task, courses) or refusal from None
+            plans.append(_at_least(task, display, courses, refusal))
     return min(plans, key=lambda plan: _score_m(plan.path, task))
+
+
+def _at_least(task: Task, display: Display, courses: Sequence[LineString], refusal: Infeasible) -> MethodPlan:
+    """A plan along the shortest way, where a method finds none though the length suffices for that.
+
+    Raises
+    ------
+    Infeasible
+        It does not, or is none from one place to another.
+    """
+    if task.waters.launch.place == task.waters.recovery.place:
+        raise _too_short(task, courses) or refusal
+    way = _shortest_way(task)
+    if not way.is_simple:
+        raise refusal
+    if not task.budget.fits(way.length):
+        raise _too_short(task, [way]) or refusal
+    return _along([way], task, display)
 
 
 def _too_short(task: Task, courses: Sequence[LineString]) -> Infeasible | None:
