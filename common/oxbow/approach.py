@@ -194,7 +194,10 @@ class Harbour:
     def __init__(self, space: FreeSpace, spacing_m: float) -> None:
         self.space = space
         self._shore = leg_routes(space.free, space.water)
-        self._lanes = [_Lanes(space, self._shore, APART * spacing_m * 0.5**step) for step in range(HALVINGS)]
+        inner = Routes(space.free)
+        self._lanes = [
+            _Lanes(space, self._shore, inner, APART * spacing_m * 0.5**step) for step in range(HALVINGS)
+        ]
 
     def approach(self, share: Polygon, vehicle: Vehicle) -> Approach:
         """The approach of a vehicle to its share.
@@ -250,6 +253,7 @@ class _Lanes:
 
     space: FreeSpace
     shore: Routes
+    inner: Routes
     apart_m: float
 
     @cached_property
@@ -292,12 +296,17 @@ class _Lanes:
     def beside_entry(self, place: Place) -> BaseGeometry:
         """Where legs may run from a place to the middle of the free space; over land to the berth alone."""
         landing = Landing.of(place, self.space.water)
-        strip = LineString(self._entry(place)).buffer(self.apart_m)
+        strip = LineString(way_to(self.space.free, self.shore, place)).buffer(self.apart_m)
         return (strip & self.space.water) | LineString([landing.place, landing.berth]).buffer(ON_SHORE_M)
 
     def _entry(self, place: Place) -> FloatArray:
-        """The way (n, 2) from a place, ashore or not, to the middle of the free space."""
-        return way_to(self._middle, self.shore, place)
+        """The way (n, 2) from a place, ashore or not, to the middle of the free space.
+
+        It is through free space that it leads on, once it is there: not by the shortest water.
+        """
+        way = way_to(self.space.free, self.shore, place)
+        onward = way_to(self._middle, self.inner, (float(way[-1, 0]), float(way[-1, 1])))
+        return np.vstack([way[:-1], onward]) if len(way) > 1 else onward
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 
 from oxbow.contracts import MAX_REQUEST_BYTES, Role, Variogram
-from oxbow.contracts.message import MOST_LENGTH_M
+from oxbow.contracts.message import LEAST_LENGTH_M, MOST_LENGTH_M
 from oxbow.danger_zones import GivenDangerZone, require_dangers
 from oxbow.errors import InvalidMission
 from oxbow.files import read_bytes, write_atomically
@@ -108,9 +108,13 @@ _POSITIVE = (
     "minimal_spatial_rate_m",
     "swath_m",
 )
-_MOST = dict.fromkeys((*_POSITIVE, "danger_detour_m"), MOST_LENGTH_M) | {"safety_m": FARTHEST_M}
-_BOUNDS = {"shore_tolerance_m": (0.0, 10_000.0), "least_width_m": (1e-3, 1_000.0)}
-"""Least and greatest value, m: a seam of rounding width is never water, and nobody carries a boat for hours."""
+_RANGES = dict.fromkeys(_POSITIVE, (LEAST_LENGTH_M, MOST_LENGTH_M)) | {
+    "danger_detour_m": (0.0, MOST_LENGTH_M),
+    "safety_m": (0.0, FARTHEST_M),
+    "shore_tolerance_m": (0.0, 10_000.0),
+    "least_width_m": (1e-3, 1_000.0),
+}
+"""Least and greatest values: a seam of rounding width is never water, and nobody carries a boat for hours."""
 _PARTS: dict[str, tuple[type[msgspec.Struct], bool]] = {
     "Bloom": (Bloom, False),
     "Vehicles": (GivenVehicle, True),
@@ -197,13 +201,9 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
             value = getattr(self, field)
             if value is not None and not (math.isfinite(value) and value >= 0):
                 raise InvalidMission(f"is {value!r}; expected a finite number >= 0", where=_JSON_NAMES[field])
-        for field, most in _MOST.items():
+        for field, (least, most) in _RANGES.items():
             value = getattr(self, field)
-            if value is not None and value > most:
-                raise InvalidMission(f"is {value!r}; expected at most {most:g}", where=_JSON_NAMES[field])
-        for field, (least, most) in _BOUNDS.items():
-            value = getattr(self, field)
-            if not least <= value <= most:
+            if value is not None and not least <= value <= most:
                 raise InvalidMission(
                     f"is {value!r}; expected a number from {least:g} to {most:g}", where=_JSON_NAMES[field]
                 )

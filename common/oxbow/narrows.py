@@ -55,12 +55,12 @@ def without_narrows(water: Polygon | MultiPolygon, width_m: float) -> MultiPolyg
 def is_basin(part: Polygon, safety_m: float, width_m: float) -> bool:
     """Whether a connected part of the free space is a basin, not a wide spot of a narrow water.
 
-    A wide spot fits into a circle as wide as the safety distance: a leg through narrow water may pass it. No leg
-    may pass a basin, whose own free water lies nearer. A thin strip of free water is what rounding leaves of a
+    A wide spot fits into a circle whose radius is the safety distance: a leg through narrow water may pass it. No
+    leg may pass a basin, whose own free water lies nearer. A thin strip of free water is what rounding leaves of a
     water just as wide as twice the safety distance.
     """
     radius_m = float(shapely.minimum_bounding_radius(part))
-    return radius_m > max(safety_m, width_m) / 2 and part.area > THIN * width_m * 2.0 * radius_m
+    return radius_m > max(safety_m, width_m) and part.area > THIN * width_m * 2.0 * radius_m
 
 
 def _rings(water: Polygon | MultiPolygon) -> tuple[int, int]:

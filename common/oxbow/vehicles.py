@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from oxbow.contracts import Role
-from oxbow.contracts.message import MOST_LENGTH_M
+from oxbow.contracts.message import LEAST_LENGTH_M, MOST_LENGTH_M
 from oxbow.errors import InvalidMission
 from oxbow.frame import Position
 
@@ -86,9 +86,10 @@ def require_distinct(vehicles: Sequence[GivenVehicle]) -> None:
                 raise InvalidMission(
                     f"is {value!r}; expected a finite number > 0", where=f"{where}.{_JSON_NAMES[field]}"
                 )
-            if value is not None and value > MOST_LENGTH_M:
+            if value is not None and not LEAST_LENGTH_M <= value <= MOST_LENGTH_M:
                 raise InvalidMission(
-                    f"is {value!r}; expected at most {MOST_LENGTH_M:g}", where=f"{where}.{_JSON_NAMES[field]}"
+                    f"is {value!r}; expected a number from {LEAST_LENGTH_M:g} to {MOST_LENGTH_M:g}",
+                    where=f"{where}.{_JSON_NAMES[field]}",
                 )
         factors = {"Danger_factor": vehicle.danger_factor}
         factors |= {f"Danger_factors[{spot!r}]": own for spot, own in (vehicle.danger_factors or {}).items()}

@@ -212,6 +212,16 @@ def _balanced(mesh: Mesh, share: Indices, capacities: FloatArray, allowed: Mask)
     return _within_reach(mesh, share, allowed)
 
 
+def _with_all(share: Indices, allowed: Mask) -> Indices:
+    """Shares of which none is empty: who has nothing within reach gets a triangle of the largest share there."""
+    share = share.copy()
+    for vehicle in np.flatnonzero(~(allowed & (share == np.arange(len(allowed))[:, None])).any(axis=1)):
+        sizes = np.bincount(share, minlength=len(allowed))
+        within = np.flatnonzero(allowed[vehicle])
+        share[within[np.argmax(sizes[share[within]])]] = vehicle
+    return share
+
+
 def _within_reach(mesh: Mesh, share: Indices, allowed: Mask) -> Indices:
     """Shares without what is not allowed, and what that cuts off; neighbours have it, where they may.
 
@@ -219,6 +229,7 @@ def _within_reach(mesh: Mesh, share: Indices, allowed: Mask) -> Indices:
     """
     if allowed.all():
         return share
+    share = _with_all(share, allowed)
     kept = np.zeros(len(mesh), dtype=bool)
     for vehicle, own in enumerate(allowed):
         kept |= largest_piece(mesh, own & (share == vehicle))

@@ -124,8 +124,8 @@ def test_water_without_narrows_is_left_as_it_is():
     assert shapely.equals_exact(without_narrows(cross, 0.1).geoms[0], cross, tolerance=0.0)
 
 
-@pytest.mark.parametrize(("part", "is_one"), [(Point(0, 0).buffer(1.9), False), (box(0, 0, 1, 5), True)])
-def test_a_wide_spot_fits_into_a_circle_as_wide_as_the_safety_distance(part, is_one):
+@pytest.mark.parametrize(("part", "is_one"), [(Point(0, 0).buffer(3.9), False), (box(0, 0, 1, 10), True)])
+def test_a_wide_spot_fits_into_a_circle_of_the_safety_distance(part, is_one):
     assert is_basin(part, 4.0, 0.1) is is_one
 
 

@@ -32,6 +32,9 @@ __all__ = [
 MOST_SEED = 2**53
 """JSON readers keep whole numbers up to this exactly."""
 
+LEAST_LENGTH_M = 1e-3
+"""Of lengths and speeds in a mission: what is less is as good as nothing, and shorter than rounding."""
+
 MOST_LENGTH_M = 1e9
 """More than any vehicle travels: 25 times round the Earth."""
 
