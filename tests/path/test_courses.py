@@ -10,9 +10,10 @@ from oxbow.contracts import Method, PathPlan, PathRequest
 from oxbow.errors import Infeasible
 from oxbow.recording import discard
 from oxbow.route.mesh import Mesh
+from oxbow_path.course import best_plan
 from oxbow_path.course.loops import Middles
 from oxbow_path.service import handle
-from oxbow_path.task import FINEST, FINEST_ALONG, finest_spacing_m
+from oxbow_path.task import FINEST, FINEST_ALONG, Display, MethodPlan, Task, finest_spacing_m
 from oxbow_path.walk.probe import Probe
 
 
@@ -120,3 +121,20 @@ def test_water_narrower_than_the_least_spacing_is_walked_once_round(method):
     require_sound(plan, asked, least_share=0.45)
     assert farthest_m(plan, asked) <= 0.1
     assert len(plan.path.coords) <= 1000
+
+
+def test_the_method_is_asked_first_but_in_narrow_water():
+    def unasked(*_: object) -> MethodPlan:
+        raise AssertionError("the method was asked")
+
+    display = Display(discard, 0.0)
+    canal = box(0, 0, 1000, 20)
+    for length_m, is_asked in ((1500, False), (3500, True)):
+        spacings = length_m / np.sqrt(canal.area)
+        asked = request(canal, spacings=spacings, safety=0.001, launch=(10, 10), recovery=(990, 10))
+        task = Task.of(asked, lambda: False)
+        if is_asked:
+            with pytest.raises(AssertionError, match="was asked"):
+                best_plan(unasked, task, display)
+        else:
+            assert best_plan(unasked, task, display).path.length >= 0.95 * asked.length_m

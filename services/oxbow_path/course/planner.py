@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 import shapely
@@ -32,7 +33,10 @@ REACH = 0.5
 EVENNESS_QUANTILE = 0.95
 
 GOOD = 1.6
-"""A course whose `_score_m` is no more spacings than this is taken at once: no method does much better."""
+"""A plan whose `_score_m` is no more spacings than this is taken at once: the other would hardly do better."""
+
+NARROW = 2.65
+"""In water of no more mean width than this, in spacings, no method's pattern has room: courses are tried first."""
 
 
 def best_plan(method: PathMethod, task: Task, display: Display) -> MethodPlan:
@@ -45,15 +49,23 @@ def best_plan(method: PathMethod, task: Task, display: Display) -> MethodPlan:
     """
     courses = list(_courses(task))
     fitting = [course for course in courses if task.budget.fits(course.length)]
-    plans = [_along(fitting, task, display)] if fitting else []
-    if plans and _score_m(plans[0].path, task) <= GOOD * task.spacing_m:
-        return plans[0]
-    try:
-        plans.append(method(task, display))
-    except Infeasible as refusal:
-        if not plans:
-            plans.append(_at_least(task, display, courses, refusal))
+    by_method, by_course = partial(method, task, display), partial(_along, fitting, task, display)
+    ways = ([by_course, by_method] if _is_narrow(task) else [by_method, by_course]) if fitting else [by_method]
+    plans: list[MethodPlan] = []
+    for way in ways:
+        try:
+            plans.append(way())
+        except Infeasible as refusal:
+            if not fitting:
+                plans.append(_at_least(task, display, courses, refusal))
+        if plans and (task.stop() or _score_m(plans[-1].path, task) <= GOOD * task.spacing_m):
+            break
     return min(plans, key=lambda plan: _score_m(plan.path, task))
+
+
+def _is_narrow(task: Task) -> bool:
+    free = task.waters.free
+    return 2 * free.area <= NARROW * task.spacing_m * free.length
 
 
 def _at_least(task: Task, display: Display, courses: Sequence[LineString], refusal: Infeasible) -> MethodPlan:
