@@ -59,7 +59,9 @@ class JudgedSpace:
         if water.is_empty:
             raise Infeasible("cover the whole outline; expected some water between them", where="zones")
         detail_m = _detail(water, request)
-        parts = polygons(eroded(without_narrows(water, request.least_width_m), request.safety_m, detail_m))
+        # The safety distance leaves out what is narrower than twice itself.
+        width_m = request.least_width_m if 2 * request.safety_m < request.least_width_m else 0.0
+        parts = polygons(eroded(without_narrows(water, width_m), request.safety_m, detail_m))
         if not parts:
             raise Infeasible(
                 f"is {request.safety_m:g} m, which leaves no water; expected less than {_inradius(water):g} m",

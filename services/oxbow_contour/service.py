@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
 import shapely
 from msgspec import structs
 from shapely import MultiPolygon, Polygon
@@ -12,6 +13,7 @@ from oxbow.contracts import ContourRequest, DroppedPart, FreeSpace
 from oxbow.errors import Infeasible
 from oxbow.narrows import is_basin, without_narrows
 from oxbow.recording import Layer, LayerKind, Show
+from oxbow.tolerances import ON_SHORE_M
 from oxbow_contour.basins import require_reachable
 from oxbow_contour.free_space import MANY_POINTS, Eroded, erode_water
 from oxbow_contour.home import home_water
@@ -42,7 +44,7 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
     """
     show(Layer(stage="contour", name="raw", geometries=(request.outline, *request.zones)))
     water = MultiPolygon(true_water(request.outline, request.zones))
-    opened = without_narrows(water, request.least_width_m)
+    opened = _opened(water, request)
     waters = tuple(opened.geoms)
     if not waters:
         raise Infeasible(
@@ -63,6 +65,16 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
         dropped=dropped,
         warnings=(*eroded.warnings, *_narrow(water, opened, request), *_summary(dropped)),
     )
+
+
+def _opened(water: MultiPolygon, request: ContourRequest) -> MultiPolygon:
+    """The water without narrows; as it is, where they part nothing and the safety distance leaves them out."""
+    opened = without_narrows(water, request.least_width_m)
+    if 2 * request.safety_m < request.least_width_m or len(opened.geoms) != len(water.geoms):
+        return opened
+    places = shapely.points(np.reshape(request.places, (-1, 2)))
+    in_narrows = shapely.distance(places, opened) > shapely.distance(places, water) + ON_SHORE_M
+    return opened if in_narrows.any() else without_narrows(water, 0.0)
 
 
 def _free_space(home: Polygon, request: ContourRequest, area_m2: float) -> Eroded:

@@ -283,15 +283,18 @@ def _closed(
     """Out to the ring, round it, and back beside the way out: to the same place, or to another on the way."""
     line = LineString(ring)
     at = _meeting(line, launch.entry, free)
+    trips = []
     for beside, side in itertools.product(BESIDE, (1.0, -1.0)):
         middle = at + beside * opening_m
         round_trip = _part(line, middle + opening_m / 2, middle - opening_m / 2)
         back = _beside(recovery, opening_m, side)[::-1]
-        for trip in (round_trip, round_trip[::-1]):
-            yield _chain(launch.leg[:-1], trip, back)
-            if not _on(ring, launch):
-                # The ring is farther away: between it and the entry, the ways run beside one another.
-                yield _chain(launch.leg, trip, _aside(launch.leg[-1], trip[-1], side * opening_m / 2), back)
+        trips += [(round_trip, side, back), (round_trip[::-1], side, back)]
+    for trip, _, back in trips:
+        yield _chain(launch.leg[:-1], trip, back)
+    if not _on(ring, launch):
+        # The ring is farther away than the leg is straight: on from the entry, the ways run beside one another.
+        for trip, side, back in trips:
+            yield _chain(launch.leg, trip, _aside(launch.leg[-1], trip[-1], side * opening_m / 2), back)
 
 
 def _round(
