@@ -210,7 +210,7 @@ def test_without_hot_spots_the_slave_surveys_as_far_as_it_goes(prior):
     assert plan.treatment is None
     assert slave.length_m <= 3_000.0 < master.length_m
     assert plan.slave_certificate.judged_area == pytest.approx(1.0)
-    assert slave.spacing_m > master.spacing_m
+    assert plan.slave_certificate.p95_distance_m > plan.certificate.p95_distance_m
 
 
 def test_many_of_both_roles():
