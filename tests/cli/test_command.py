@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from importlib.metadata import version
@@ -71,8 +72,17 @@ def shadowed(folder, module, code):
     return str(folder / "shadow")
 
 
+@pytest.fixture
+def heard_hangup():
+    """SIGHUP as a terminal sends it: tests that run under `nohup` would have commands ignore it, and rightly."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
 @pytest.mark.parametrize(("number", "status"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
 @pytest.mark.parametrize("command", [["plan", "--local"], ["evaluate"], ["picture", "-o", "pond.png"]])
+@pytest.mark.usefixtures("heard_hangup")
 def test_a_signal_ends_the_command_whatever_it_is_at(oxbow, folder, number, status, command):
     """Here, it comes while a library is imported that takes every exception for a fault of its own."""
     code = (
