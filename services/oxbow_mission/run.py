@@ -71,7 +71,7 @@ class Run:
         return Planned(document=mission_json(msgspec.structs.replace(mission, plan=plan)))
 
     def __call__(self, endpoint: Endpoint[Q, R], request: Q, /, *, part: str = "") -> R:
-        """Call a stage (`oxbow.pipeline.Call`)."""
+        """Call a stage (`oxbow.contracts.Call`)."""
         fraction = min(self.calls / self.expected_calls, 1.0)
         self.calls += 1
         started = time.monotonic()

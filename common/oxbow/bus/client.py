@@ -108,7 +108,7 @@ class Bus(Session):
 
 
 class BusCall:
-    """`oxbow.pipeline.Call` over the bus: the calls of one run of one mission.
+    """`oxbow.contracts.Call` over the bus: the calls of one run of one mission.
 
     Parameters
     ----------
