@@ -80,7 +80,7 @@ class Approach:
         """
         if self._legs_m >= range_m:
             raise Infeasible(
-                f"is {range_m:.0f} m; the way to the vehicle's share and home is {self._legs_m:.0f} m",
+                f"is {range_m:.6g} m; the way to the vehicle's share and home is {self._legs_m:.0f} m",
                 "Master_length",
             )
         return range_m - self._legs_m

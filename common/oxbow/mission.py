@@ -193,14 +193,6 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
     extra: dict[str, Any] = {}
 
     def __post_init__(self) -> None:
-        for field in _POSITIVE:
-            value = getattr(self, field)
-            if value is not None and not (math.isfinite(value) and value > 0):
-                raise InvalidMission(f"is {value!r}; expected a finite number > 0", where=_JSON_NAMES[field])
-        for field in ("safety_m", "danger_detour_m"):
-            value = getattr(self, field)
-            if value is not None and not (math.isfinite(value) and value >= 0):
-                raise InvalidMission(f"is {value!r}; expected a finite number >= 0", where=_JSON_NAMES[field])
         for field, (least, most) in _RANGES.items():
             value = getattr(self, field)
             if value is not None and not least <= value <= most:

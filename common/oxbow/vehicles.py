@@ -70,7 +70,7 @@ class VehiclePath(
 
 
 def require_distinct(vehicles: Sequence[GivenVehicle]) -> None:
-    """Check that every vehicle has a name of its own, a speed and a range above 0, and a factor of 1 at least."""
+    """Check that every vehicle has a name of its own, a speed and range in bounds, and a factor of 1 at least."""
     seen: dict[str, int] = {}
     for index, vehicle in enumerate(vehicles):
         where = f"Vehicles[{index}]"
@@ -82,10 +82,6 @@ def require_distinct(vehicles: Sequence[GivenVehicle]) -> None:
             )
         for field in ("speed_mps", "length_m"):
             value = getattr(vehicle, field)
-            if value is not None and not (math.isfinite(value) and value > 0):
-                raise InvalidMission(
-                    f"is {value!r}; expected a finite number > 0", where=f"{where}.{_JSON_NAMES[field]}"
-                )
             if value is not None and not LEAST_LENGTH_M <= value <= MOST_LENGTH_M:
                 raise InvalidMission(
                     f"is {value!r}; expected a number from {LEAST_LENGTH_M:g} to {MOST_LENGTH_M:g}",

@@ -133,6 +133,6 @@ class Reach:
         for vehicle, own, way_m in zip(vehicles, self.allowed, least_m, strict=True):
             if not own.any():
                 raise Infeasible(
-                    f"is {vehicle.length_m:.0f} m; the way to the nearest water and home is {way_m:.0f} m",
+                    f"is {vehicle.length_m:.6g} m; the way to the nearest water and home is {way_m:.0f} m",
                     where=f"vehicle {vehicle.name!r}: length_m",
                 )

@@ -140,7 +140,7 @@ def _require_room(water: Sequence[Polygon], safety_m: float, *, is_certain: bool
     if is_certain or radius_m + precision_m < safety_m:
         at_most_m = rounded_down(0.99 * min(radius_m, safety_m))
         raise Infeasible(
-            f"safety_m = {safety_m:g} leaves no water; expected at most {at_most_m:g} m, which leaves some",
+            f"is {safety_m:g} m, which leaves no water; expected at most {at_most_m:g} m, which leaves some",
             where="Safety",
         )
 

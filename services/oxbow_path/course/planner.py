@@ -92,7 +92,7 @@ def _too_short(task: Task, courses: Sequence[LineString]) -> Infeasible | None:
         return None
     shortest_m = min(course.length for course in courses)
     return Infeasible(
-        f"is {task.request.length_m:.0f} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
+        f"is {task.request.length_m:.6g} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
         "Master_length",
     )
 

@@ -76,7 +76,7 @@ def _start(task: Task) -> Trial:
             is_starved = trial.length_m < LEAST_START * task.budget.limit_m
             return with_remainder(trial, task.waters, task.budget) if is_starved else trial
     raise Infeasible(
-        f"is {task.request.length_m:.0f} m; the shortest path from launch to recovery is {trial.length_m:.0f} m",
+        f"is {task.request.length_m:.6g} m; the shortest path from launch to recovery is {trial.length_m:.0f} m",
         "Master_length",
     )
 

@@ -154,7 +154,7 @@ def plan_tour(task: Task, *, solver: Solver | None = None) -> TourPlan:
     if not fitting:
         shortest_m = min(trial.length_m for trial in trials)
         raise Infeasible(
-            f"is {task.request.length_m:.0f} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
+            f"is {task.request.length_m:.6g} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
             "Master_length",
         )
     chosen = min(fitting, key=lambda trial: _score(trial, task.waters, budget))

@@ -102,7 +102,7 @@ def _longest(trials: Sequence[Trial], budget: Budget) -> Trial:
         return max(fitting, key=lambda trial: trial.length_m)
     shortest_m = min(trial.length_m for trial in trials)
     raise Infeasible(
-        f"is {budget.limit_m:.0f} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
+        f"is {budget.limit_m:.6g} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
         "Master_length",
     )
 
