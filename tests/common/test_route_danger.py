@@ -7,7 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from route_scenes import places_in, scene
+from route_scenes import places_in, scene, scene_router
 from shapely import Polygon, box
 
 from oxbow.contracts import DangerZone, Per
@@ -81,28 +81,16 @@ def test_the_outline_of_a_zone_is_outside():
 
 @every_method
 @quick
-@given(seed=st.integers(0, 10_000))
-def test_without_zones_routes_are_unchanged(seed, method):
-    water = scene(seed)
-    start, goal = places_in(water, 2, seed)
-    plain = make_router(method, water).route(start, goal)
-    other = make_router(method, water, Danger(c_max_m=1e6, a=7.0)).route(start, goal)
-    assert np.array_equal(plain.polyline, other.polyline)
-    assert other.cost == plain.length_m
-    assert other.danger == 0.0
-
-
-@every_method
-@quick
 @given(seed=st.integers(0, 10_000), factor=st.floats(1.0, 1e3))
-def test_zones_without_danger_leave_routes_unchanged(seed, method, factor):
+def test_without_zones_or_with_zones_without_danger_routes_are_unchanged(seed, method, factor):
     water = scene(seed)
     start, goal = places_in(water, 2, seed)
-    plain = make_router(method, water).route(start, goal)
-    harmless = Danger((per_metre(0.0), per_crossing(0.0)), c_max_m=1e4, a=factor)
-    other = make_router(method, water, harmless).route(start, goal)
-    assert np.array_equal(plain.polyline, other.polyline)
-    assert other.cost == plain.length_m
+    plain = scene_router(method, water).route(start, goal)
+    for zones in ((), (per_metre(0.0), per_crossing(0.0))):
+        other = scene_router(method, water, Danger(zones, c_max_m=1e4, a=factor)).route(start, goal)
+        assert np.array_equal(plain.polyline, other.polyline)
+        assert other.cost == plain.length_m
+        assert other.danger == 0.0
 
 
 @quick
@@ -165,21 +153,33 @@ def test_a_zone_is_travelled_or_avoided_as_it_is_worth(method, zone):
 
 @every_method
 @quick
-@given(seed=st.integers(0, 10_000))
-def test_distances_are_the_costs_of_the_routes(seed, method):
+@given(seed=st.integers(0, 10_000), factor=st.floats(1.0, 2.0))
+def test_distances_and_tables_are_the_costs_lengths_and_lines_of_the_routes(seed, method, factor):
     water = scene(seed, obstacles=3)
     points = places_in(water, 4, seed)
-    danger = Danger((per_metre(0.01), per_crossing(0.2, box(10, 10, 50, 45))), c_max_m=100.0, a=1.1)
-    router = make_router(method, water, danger)
-    distances = router.distances(points)
+    danger = Danger((per_metre(0.01), per_crossing(0.2, box(10, 10, 50, 45))), c_max_m=100.0, a=factor)
+    router = scene_router(method, water, danger)
+    distances, table = router.distances(points), router.table(points)
     exact = make_router(RouteMethod.VISIBILITY, water).distances(points)
     assert np.array_equal(distances, distances.T)
     assert (distances >= exact - 1e-6).all()
+    assert np.array_equal(table.costs, distances)
+    assert np.array_equal(table.lengths_m, table.lengths_m.T)
     for i, j in ((0, 1), (1, 3)):
         route = router.route(points[i], points[j])
         assert route.cost == pytest.approx(distances[i, j], rel=1e-6)
-        worth_m = route.length_m - 100.0 * 1.1 * math.log1p(-route.danger)
-        assert route.cost == pytest.approx(worth_m)
+        assert route.cost == pytest.approx(worth_m(route.length_m, route.danger, factor))
+    for i, j in ((0, 1), (3, 1), (2, 2)):
+        line = table.polyline(i, j)
+        assert np.array_equal(line[[0, -1]], np.array([points[i], points[j]]))
+        assert np.hypot(*np.diff(line, axis=0).T).sum() == pytest.approx(table.lengths_m[i, j])
+        worth = worth_m(table.lengths_m[i, j], danger.probability(line), factor)
+        assert i == j or distances[i, j] == pytest.approx(worth)
+
+
+def worth_m(length_m, danger, factor):
+    """What a route costs where a chance of no harm e times as good is worth 100 m."""
+    return length_m - 100.0 * factor * math.log1p(-danger)
 
 
 def test_a_danger_of_1_is_refused_by_name():
@@ -192,22 +192,3 @@ def test_a_danger_of_1_is_refused_by_name():
         Danger(a=0.9)
     with pytest.raises(InvalidMission, match="c_max_m: is inf"):
         Danger(c_max_m=math.inf)
-
-
-@every_method
-@quick
-@given(seed=st.integers(0, 10_000))
-def test_a_table_has_the_length_and_the_line_of_every_route(seed, method):
-    water = scene(seed, obstacles=3)
-    points = places_in(water, 4, seed)
-    danger = Danger((per_metre(0.01), per_crossing(0.2, box(10, 10, 50, 45))), c_max_m=100.0, a=2.0)
-    router = make_router(method, water, danger)
-    table = router.table(points)
-    assert np.array_equal(table.costs, router.distances(points))
-    assert np.array_equal(table.lengths_m, table.lengths_m.T)
-    for i, j in ((0, 1), (3, 1), (2, 2)):
-        line = table.polyline(i, j)
-        assert np.array_equal(line[[0, -1]], np.array([points[i], points[j]]))
-        assert np.hypot(*np.diff(line, axis=0).T).sum() == pytest.approx(table.lengths_m[i, j])
-        worth_m = table.lengths_m[i, j] - 100.0 * 2.0 * math.log1p(-danger.probability(line))
-        assert i == j or table.costs[i, j] == pytest.approx(worth_m)

@@ -7,7 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from route_scenes import places_in, scene
+from route_scenes import places_in, scene, scene_router
 from scipy.sparse.csgraph import dijkstra
 from shapely import LineString, MultiPolygon, Point, Polygon, affinity, box
 
@@ -102,7 +102,7 @@ def test_turning_and_moving_the_water_changes_no_distance(seed, angle, shift):
 def test_there_and_back_are_equally_far(seed, method):
     water = scene(seed)
     start, goal = places_in(water, 2, seed)
-    router = make_router(method, water)
+    router = scene_router(method, water)
     there, back = router.route(start, goal), router.route(goal, start)
     exact = make_router(RouteMethod.VISIBILITY, water).route(start, goal).length_m
     # Routes through channels may fall to another of equal channels, reduced ones to another reduction.
