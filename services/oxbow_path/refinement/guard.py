@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
-from shapely import Polygon, STRtree
+from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray
 from oxbow.tolerances import ROUNDING_M
+from oxbow_path.refinement.inside import Inside
+from oxbow_path.refinement.nearness import beyond, least_gap_m, may_meet, nearer, steps_between
 from oxbow_path.refinement.polyline import Polyline
 
 __all__ = ["Guard"]
@@ -30,8 +33,22 @@ LOCAL_ROUNDS = 8
 
 ROUNDS = 14
 
+LOCAL = 0.5
+"""Where no node moves farther, in spacings, what can come near what is found once for all shares of a move."""
+
+BORDER_PITCH = 0.1
+"""Places of the free space's border stand so far apart, in spacings, where its distance is looked up."""
+
 FOLD, RETURN = -0.9999, -1.0 + 1e-9
 """Cosines of the turn at which a node folds its two segments nearly, and as good as wholly, onto each other."""
+
+
+@dataclass(frozen=True)
+class _Known:
+    """Which segments may meet (2, m), and how far from the border each node (n,) is at least."""
+
+    pairs: Indices
+    clear_m: FloatArray
 
 
 @dataclass(frozen=True)
@@ -44,39 +61,63 @@ class Guard:
 
     free: BaseGeometry
     clearance_m: float
+    spacing_m: float
 
     @classmethod
     def of(cls, free: Polygon, path: Polyline, spacing_m: float) -> Guard:
         """Guard a path; one whose stretches began nearer than the usual clearance may stay half as near."""
         grown = free.buffer(ROUNDING_M)
         shapely.prepare(grown)
-        segments = path.segments
-        pairs = STRtree(segments).query(segments, predicate="dwithin", distance=CLEARANCE * spacing_m)
-        first, second = _beyond(path, pairs[:, ~path.legs[pairs].any(axis=0)], NEIGHBOURS)
-        near_m = shapely.distance(segments[first], segments[second])
-        return cls(grown, min([CLEARANCE * spacing_m, *(near_m / 2)]))
+        usual_m = CLEARANCE * spacing_m
+        every = np.arange(len(path.legs))
+        pairs = may_meet(path, every, np.full(len(every), usual_m / 2), spacing_m)
+        near = beyond(path, pairs[:, ~path.legs[pairs].any(axis=0)], NEIGHBOURS)
+        gap_m = least_gap_m(path, near)
+        return cls(grown, gap_m / 2 if gap_m < usual_m else usual_m, spacing_m)
 
-    def faults(self, path: Polyline, suspect: Mask | None = None, excused: Mask | None = None) -> Mask:
+    @cached_property
+    def _inside(self) -> Inside:
+        return Inside(self.free, BORDER_PITCH * self.spacing_m)
+
+    def faults(
+        self,
+        path: Polyline,
+        suspect: Mask | None = None,
+        excused: Mask | None = None,
+        known: _Known | None = None,
+    ) -> Mask:
         """Which segments (n - 1,) leave the free space, or meet, fold onto or come too near another.
 
         Where only some segments are suspect, the others are known to be at fault with none but those. Excused ones
         may come near and fold sharply, but neither meet another nor run back on themselves.
         """
-        segments = path.segments
-        asked = np.arange(len(segments)) if suspect is None else np.flatnonzero(suspect)
+        asked = np.arange(len(path.legs)) if suspect is None else np.flatnonzero(suspect)
+        known = known or self._known(path, asked)
         excused = path.legs if excused is None else path.legs | excused
-        fault = np.zeros(len(segments), dtype=bool)
-        fault[asked] = ~shapely.covers(self.free, segments[asked]) & ~path.legs[asked]
-        index, other = STRtree(segments).query(segments[asked], predicate="dwithin", distance=self.clearance_m)
-        near = _beyond(path, np.stack([asked[index], other]), 1)
+        fault = np.zeros(len(path.legs), dtype=bool)
+        afloat = asked[~path.legs[asked]]
+        fault[afloat] = self._inside.leaving(path, afloat, known.clear_m)
+        pairs = known.pairs if suspect is None else known.pairs[:, suspect[known.pairs].any(axis=0)]
+        near, meets = nearer(path, pairs, self.clearance_m)
         # Neighbours but one, and legs, which begin side by side, may come near, but not meet.
-        may_be_near = (_steps_between(path, near) <= NEIGHBOURS) | excused[near].any(axis=0)
-        may_be_near &= ~shapely.intersects(segments[near[0]], segments[near[1]])
+        may_be_near = ~meets & ((steps_between(path, near) <= NEIGHBOURS) | excused[near].any(axis=0))
         fault[near[:, ~may_be_near]] = True
         folded = _folded(path, FOLD) & ~(excused[:-1] & excused[1:]) | _folded(path, RETURN)
         fault[:-1] |= folded
         fault[1:] |= folded
         return fault
+
+    def _known(self, path: Polyline, asked: Indices, reach_m: FloatArray | float = 0.0) -> _Known:
+        """What holds for some segments however their nodes (n,) move, each within its reach."""
+        reach_m = np.broadcast_to(reach_m, len(path.nodes))
+        each_m = np.maximum(reach_m[:-1], reach_m[1:]) + self.clearance_m / 2
+        clear_m = np.full(len(path.nodes), -np.inf)
+        clear_m[asked] = clear_m[asked + 1] = 0.0
+        ends = np.flatnonzero(clear_m == 0.0)
+        # Two circles of half a segment's length suffice, and few segments are much longer than most.
+        enough_m = 2 * float(path.lengths_m.mean()) + reach_m.max()
+        clear_m[ends] = self._inside.clear_m(path.nodes[ends], enough_m) - reach_m[ends]
+        return _Known(may_meet(path, asked, each_m, self.spacing_m), clear_m)
 
     def moved(self, path: Polyline, target: FloatArray) -> Polyline:
         """The path with its nodes as far on the way to `target` (n, 2) as keeps it inside and simple.
@@ -90,12 +131,14 @@ class Guard:
 
     def _moved(self, path: Polyline, target: FloatArray, excused: Mask | None) -> Polyline | None:
         step = np.where(path.pinned[:, None], 0.0, target - path.nodes)
+        reach_m = np.hypot(*step.T)
+        is_local = reach_m.max(initial=0.0) <= LOCAL * self.spacing_m
+        known = self._known(path, np.arange(len(path.legs)), reach_m) if is_local else None
         share = np.ones(len(path.nodes))
         suspect: Mask | None = None
-        moved = path
         for turn in range(ROUNDS):
-            moved = moved.moved(path.nodes + share[:, None] * step)
-            fault = self.faults(moved, suspect, excused)
+            moved = path.moved(path.nodes + share[:, None] * step)
+            fault = self.faults(moved, suspect, excused, known)
             if not fault.any():
                 return moved
             blamed = _ends(fault)
@@ -128,18 +171,6 @@ class Guard:
             else:
                 break
         return path
-
-
-def _steps_between(path: Polyline, pairs: Indices) -> Indices:
-    """How many segments on along the path the second of each pair (2, m) is."""
-    count = len(path.legs)
-    steps = np.abs(pairs[1] - pairs[0])
-    return np.asarray(np.minimum(steps, count - steps) if path.is_closed else steps)
-
-
-def _beyond(path: Polyline, pairs: Indices, steps: int) -> Indices:
-    """The pairs that are more than so many segments apart along the path."""
-    return np.asarray(pairs[:, _steps_between(path, pairs) > steps])
 
 
 def _ends(segment: Mask) -> Mask:

@@ -10,7 +10,7 @@ import shapely
 from shapely import LineString
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.arrays import Geometries, Indices, Mask
+from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray
 
 __all__ = ["Polyline"]
@@ -41,7 +41,8 @@ class Polyline:
     def of(cls, path: LineString, free: BaseGeometry, rigid: Mask | None = None) -> Polyline:
         """A path's own vertices as nodes; `free` is the (prepared) free space."""
         nodes = shapely.get_coordinates(path)
-        legs = ~shapely.covers(free, _segments(nodes))
+        segments = shapely.linestrings(np.stack([nodes[:-1], nodes[1:]], axis=1))
+        legs = ~np.asarray(shapely.covers(free, segments))
         pinned = np.zeros(len(nodes), dtype=bool)
         pinned[[0, -1]] = True
         pinned[:-1] |= legs
@@ -68,21 +69,9 @@ class Polyline:
         """The path."""
         return LineString(self.nodes)
 
-    @cached_property
-    def segments(self) -> Geometries:
-        """Each segment as a line, shape (n - 1,)."""
-        return _segments(self.nodes)
-
     def moved(self, nodes: FloatArray) -> Polyline:
-        """The same nodes elsewhere; the lines of segments that stay are kept, since making them takes long."""
-        moved = Polyline(nodes, self.pinned, self.legs, self.rigid)
-        elsewhere = (nodes != self.nodes).any(axis=1)
-        changed = np.flatnonzero(elsewhere[:-1] | elsewhere[1:])
-        if "segments" in self.__dict__ and len(changed) < len(self.legs) / 2:
-            segments = self.segments.copy()
-            segments[changed] = shapely.linestrings(np.stack([nodes[changed], nodes[changed + 1]], axis=1))
-            moved.__dict__["segments"] = segments
-        return moved
+        """The same nodes elsewhere."""
+        return Polyline(nodes, self.pinned, self.legs, self.rigid)
 
     def divided(self, most_m: float) -> Polyline:
         """With nodes added so that no segment is longer than `most_m`, but for legs and rigid ones."""
@@ -121,7 +110,3 @@ class Polyline:
         crowded[1:-1] = both & ~self.pinned[1:-1] & ~self.rigid[:-1] & ~self.rigid[1:]
         run = np.arange(len(crowded)) - np.maximum.accumulate(np.where(crowded, 0, np.arange(len(crowded))))
         return np.asarray(crowded & (run % 2 == 1))
-
-
-def _segments(nodes: FloatArray) -> Geometries:
-    return np.asarray(shapely.linestrings(np.stack([nodes[:-1], nodes[1:]], axis=1)))

@@ -40,6 +40,9 @@ TOUCH_M = 1e-6
 LEAST_STEP_M = 1e-9
 """A sparse matrix drops zeros."""
 
+WIDER = (2.0, 8.0)
+"""A search for a way goes so many times as far as the straight line, before it goes everywhere."""
+
 CHUNK = 256
 """So many sites are sources of one search, to bound its memory."""
 
@@ -123,6 +126,10 @@ class Geodesics:
         """Distances from one site to all, shape (n,)."""
         return np.asarray(dijkstra(self.graph, indices=np.array([site]))[0, : self.count])
 
+    def between_m(self, start: int, goal: int) -> float:
+        """The distance of two sites, found without going much farther."""
+        return float(self._search(start, goal)[0][goal])
+
     def way(self, order: Sequence[int] | Indices) -> FloatArray:
         """The closed way through the sites in that order, shape (m, 2), its end equal to its start."""
         starts, goals = np.asarray(order), np.roll(order, -1)
@@ -134,11 +141,22 @@ class Geodesics:
         return self.places[np.concatenate(parts).astype(np.intp)]
 
     def _between(self, start: int, goal: int) -> list[int]:
-        _, previous = dijkstra(self.graph, indices=np.array([start]), return_predecessors=True)
+        _, previous = self._search(start, goal)
         nodes = [goal]
         while nodes[-1] != start:
-            nodes.append(int(previous[0, nodes[-1]]))
+            nodes.append(int(previous[nodes[-1]]))
         return nodes[::-1]
+
+    def _search(self, start: int, goal: int) -> tuple[FloatArray, Indices]:
+        """Distances from a place, and predecessors on the way, as far as another place at least."""
+        straight_m = float(np.hypot(*(self.places[goal] - self.places[start]))) + LEAST_STEP_M
+        for limit_m in (*(wider * straight_m for wider in WIDER), np.inf):
+            distance, previous = dijkstra(
+                self.graph, indices=np.array([start]), return_predecessors=True, limit=limit_m
+            )
+            if np.isfinite(distance[0, goal]):
+                break
+        return distance[0], previous[0]
 
 
 def _nearest(points: FloatArray, others: FloatArray, count: int) -> Indices:

@@ -16,7 +16,7 @@ import shapely
 from shapely import LinearRing, LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.arrays import Mask
+from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow_path.walk.probe import Probe, covered
 
@@ -137,11 +137,15 @@ def _enclose(region: Polygon, probe: Probe, reach_m: float) -> tuple[list[Linear
     """Split the holes into those to keep and those that the rest of the boundary covers well enough."""
     rings = [region.exterior, *region.interiors]
     steps, owner = probe.steps(rings)
+    # Sorted by their first coordinate, those near a hole are a stretch of all.
+    order = np.argsort(steps[:, 0], kind="stable")
+    steps, owner = steps[order], owner[order]
     kept = np.ones(len(rings), dtype=bool)
     holes = [Polygon(ring) for ring in rings]
     for index in sorted(range(1, len(rings)), key=lambda i: holes[i].area):
         served = probe.points[probe.within(holes[index].buffer(reach_m))]
-        rest = _near(steps, holes[index], 2 * reach_m) & (owner != index) & kept[owner]
+        near = _near(steps, holes[index], 2 * reach_m)
+        rest = near[(owner[near] != index) & kept[owner[near]]]
         kept[index] = not covered(served, steps[rest], reach_m)
     return (
         [ring for ring, keep in zip(rings[1:], kept[1:], strict=True) if keep],
@@ -149,11 +153,12 @@ def _enclose(region: Polygon, probe: Probe, reach_m: float) -> tuple[list[Linear
     )
 
 
-def _near(points: FloatArray, area: Polygon, margin_m: float) -> Mask:
-    """Which points lie in the bounding box of an area, widened by a margin."""
+def _near(points: FloatArray, area: Polygon, margin_m: float) -> Indices:
+    """Which points, sorted by their first coordinate, lie in the box round an area, widened by a margin."""
     x0, y0, x1, y1 = area.bounds
-    low, high = np.array([x0, y0]) - margin_m, np.array([x1, y1]) + margin_m
-    return np.asarray(((points >= low) & (points <= high)).all(axis=1))
+    first, last = np.searchsorted(points[:, 0], [x0 - margin_m, x1 + margin_m])
+    y = points[first:last, 1]
+    return np.asarray(first + np.flatnonzero((y >= y0 - margin_m) & (y <= y1 + margin_m)))
 
 
 def _cuts(region: Polygon) -> list[LineString]:
