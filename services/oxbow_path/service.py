@@ -82,7 +82,7 @@ def _length_warnings(plan: MethodPlan, task: Task) -> Iterator[str]:
     if share < ACCEPTED:
         if plan.spacing_m <= request.min_spacing_m:
             reason = f"Minimal_spatial_rate keeps the spacing at {request.min_spacing_m:g} m"
-        elif plan.spacing_m <= finest_spacing_m(request.space):
+        elif min(plan.spacing_m, task.spacing_m) <= finest_spacing_m(request.space):
             reason = f"the water is small, and no spacing below {finest_spacing_m(request.space):.2g} m is planned"
         elif task.stop():
             reason = f"its improvement ended after {request.time_limit_s:g} s"

@@ -95,6 +95,17 @@ def test_a_loop_round_a_chain_of_islands_holds_them_all():
     assert not list(Middles.of(Mesh.of(water, detail_m=5.0)).loops(10.0, 100.0))
 
 
+def test_the_ends_of_long_arms_are_reached_where_length_is_plentiful():
+    ray = shapely.Polygon([(0, -8), (300, 0), (0, 8)])
+    arms = shapely.union_all([affinity.rotate(ray, 60.0 * turn, origin=(0, 0)) for turn in range(6)])
+    asked = request(
+        arms, spacings=60.0, min_spacing_m=4.0, safety=0.005, launch=(0, 0), method=Method.SPACE_FILLING_CURVE
+    )
+    plan = handle(asked, discard)
+    require_sound(plan, asked, least_share=0.3)
+    assert farthest_m(plan, asked) <= 4.4
+
+
 def test_a_ragged_lake_one_way_at_any_length():
     water = lake(3)
     west, east = (Point(xy) for xy in ((-400, 0), (400, 0)))

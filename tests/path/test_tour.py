@@ -18,7 +18,7 @@ from oxbow.testing import nasty_polygons
 from oxbow_path.task import Task
 from oxbow_path.tour.geodesic import Shore
 from oxbow_path.tour.local_search import shortened
-from oxbow_path.tour.outline import enclosed
+from oxbow_path.tour.outline import _slit, enclosed
 from oxbow_path.tour.planner import TourPlan, plan_tour
 from oxbow_path.tour.pruning import pruned
 from oxbow_path.tour.pyvrp_solver import is_installed, polished
@@ -225,6 +225,16 @@ def test_the_outline_of_any_tour_is_one_ring_near_all_its_places(way, places):
     assert SQUARE.covers(region)
     assert LineString(region.exterior).is_simple
     assert max(region.boundary.distance(Point(place)) for place in places) <= 1.5
+
+
+def test_slits_that_part_a_region_are_left_out_and_no_others():
+    across, into = ([box(x, -1, x + 1, top) for x in range(5, 95, 10)] for top in (101, 50))
+    alone = _slit(SQUARE, np.array(into))
+    assert alone.area == pytest.approx(100 * 100 - 50 * len(into))
+    both = _slit(SQUARE, np.array([*across, *into]))
+    assert both.area == pytest.approx(alone.area)
+    halves = np.array([half for x in range(5, 95, 10) for half in (box(x, -1, x + 1, 51), box(x, 49, x + 1, 101))])
+    assert _slit(SQUARE, halves).area == pytest.approx(100 * 100 - 51 * (len(halves) // 2))
 
 
 @quick

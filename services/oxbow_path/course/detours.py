@@ -12,7 +12,6 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 from shapely import LineString, Point, Polygon
-from shapely.ops import substring
 
 from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
@@ -130,8 +129,13 @@ def _end_of(out: LineString, length_m: float) -> LineString:
 
 
 def _part(line: LineString, start_m: float, end_m: float) -> LineString:
-    part = substring(line, start_m, end_m)
-    return part if isinstance(part, LineString) else line
+    """A line from one distance along it to another; the whole line where these are one place."""
+    points = shapely.get_coordinates(line)
+    at_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    if min(end_m, at_m[-1]) <= start_m:
+        return line
+    ends = np.column_stack([np.interp([start_m, end_m], at_m, axis) for axis in points.T])
+    return LineString(np.vstack([ends[:1], points[(at_m > start_m) & (at_m < end_m)], ends[1:]]))
 
 
 def _round(path: LineString, out: LineString, waters: Waters, half_width_m: float) -> LineString | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -29,6 +30,9 @@ WAYS = 4.0
 
 REACH = 0.5
 """Water nearer to the course than this, in spacings, needs no detour."""
+
+FAR = 1.0
+"""Where length is plentiful, water farther from a path than this, in spacings, gets a detour."""
 
 EVENNESS_QUANTILE = 0.95
 
@@ -60,7 +64,18 @@ def best_plan(method: PathMethod, task: Task, display: Display) -> MethodPlan:
                 plans.append(_at_least(task, display, courses, refusal))
         if plans and (task.stop() or _score_m(plans[-1].path, task) <= GOOD * task.spacing_m):
             break
-    return min(plans, key=lambda plan: _score_m(plan.path, task))
+    return _reaching(min(plans, key=lambda plan: _score_m(plan.path, task)), task)
+
+
+def _reaching(plan: MethodPlan, task: Task) -> MethodPlan:
+    """A plan that leaves no water far away that a detour reaches, where length is plentiful.
+
+    The refinement cannot see round a headland, and takes many steps to the end of a long arm.
+    """
+    if task.enough_m == 0.0:
+        return plan
+    path = with_detours(plan.path, task.waters, task.budget.most_m, reach_m=FAR * task.spacing_m)
+    return replace(plan, path=path)
 
 
 def _is_narrow(task: Task) -> bool:

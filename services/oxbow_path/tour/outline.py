@@ -11,9 +11,11 @@ construction.
 
 from __future__ import annotations
 
+from typing import TypeGuard
+
 import numpy as np
 import shapely
-from shapely import LineString, Point, Polygon
+from shapely import LineString, Point, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import Geometries, Mask
@@ -73,14 +75,41 @@ def _moats(region: Polygon, free: Polygon, width_m: float) -> BaseGeometry:
 
 
 def _slit(region: Polygon, slits: Geometries) -> Polygon:
-    """The region less the slits that do not part it: all together, or else one half of them after the other."""
+    """The region less the slits that do not part it."""
     if len(slits) == 0:
         return region
     rest = region.difference(shapely.union_all(slits))
-    if isinstance(rest, Polygon) and not rest.is_empty:
+    if _is_whole(rest):
+        return rest
+    # Slits that together part it, but for those that join the parts again.
+    left = slits[~_joining(shapely.get_parts(rest), slits)]
+    rest = region.difference(shapely.union_all(left))
+    return rest if _is_whole(rest) else _slit_by_halves(region, slits)
+
+
+def _is_whole(rest: BaseGeometry) -> TypeGuard[Polygon]:
+    return isinstance(rest, Polygon) and not rest.is_empty
+
+
+def _joining(parts: Geometries, slits: Geometries) -> Mask:
+    """Fewest slits that join all parts that they touch: chosen from the last to the first (Kruskal 1956)."""
+    slit, part = STRtree(parts).query(slits, predicate="dwithin", distance=ROUNDING_M)
+    joined, joining = np.arange(len(parts)), np.zeros(len(slits), dtype=bool)
+    for number in np.unique(slit)[::-1]:
+        together = np.unique(joined[part[slit == number]])
+        if len(together) > 1:
+            joining[number] = True
+            joined[np.isin(joined, together)] = together[0]
+    return joining
+
+
+def _slit_by_halves(region: Polygon, slits: Geometries) -> Polygon:
+    """The same where slits overlap so much that one alone joins nothing: one half of them after the other."""
+    rest = region.difference(shapely.union_all(slits))
+    if _is_whole(rest):
         return rest
     half = len(slits) // 2
-    return region if half == 0 else _slit(_slit(region, slits[:half]), slits[half:])
+    return region if half == 0 else _slit_by_halves(_slit_by_halves(region, slits[:half]), slits[half:])
 
 
 def _is_odd(faces: Geometries, way: FloatArray) -> Mask:
