@@ -21,7 +21,7 @@ from oxbow_path.tour import tour
 from oxbow_path.transect import transects
 from oxbow_path.watershed import watershed
 
-__all__ = ["METHODS", "handle"]
+__all__ = ["METHODS", "handle", "planned"]
 
 METHODS: dict[Method, PathMethod] = {
     Method.SPACE_FILLING_CURVE: space_filling_curve,
@@ -39,7 +39,12 @@ ACCEPTED = 0.95
 
 def handle(request: PathRequest, show: Show) -> PathPlan:
     """Plan a path by the requested method, check it, and show how it came about."""
-    task = Task.of(request, _stop(request.time_limit_s))
+    return planned(request, _stop(request.time_limit_s), show)
+
+
+def planned(request: PathRequest, stop: Stop, show: Show) -> PathPlan:
+    """See `handle`; `stop` tells whether the request's time limit is up."""
+    task = Task.of(request, stop)
     display = Display(show, request.decomposition.heading_rad)
     plan = best_plan(METHODS[request.method], task, display)
     claimed_m = min(plan.spacing_m, WIDEST * task.spacing_m)

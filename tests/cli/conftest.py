@@ -4,11 +4,12 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from warm_commands import WarmCommands
 
 OXBOW = (sys.executable, "-m", "oxbow_cli")
 
@@ -60,8 +61,8 @@ def rows() -> list[dict[str, float]]:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder that holds the pond's Mission File, pond.json."""
-    (tmp_path / "pond.json").write_text(json.dumps(make_pond()))
+    """A folder that holds the pond's Mission File, pond.json, with a path that is soon planned."""
+    (tmp_path / "pond.json").write_text(json.dumps(make_pond(Master_length=2500.0)))
     return tmp_path
 
 
@@ -72,13 +73,28 @@ def environment(tmp_path: Path) -> dict[str, str]:
     return {**kept, "OXBOW_HOME": str(tmp_path / "home"), "COLUMNS": "160", "NO_COLOR": "1"}
 
 
+@pytest.fixture(scope="session")
+def warm_commands() -> Iterator[WarmCommands]:
+    with WarmCommands() as commands:
+        yield commands
+
+
 @pytest.fixture
-def oxbow(folder: Path, environment: dict[str, str]) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Run the command to its end."""
+def oxbow(
+    folder: Path,
+    environment: dict[str, str],
+    warm_commands: WarmCommands,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run the command to its end; with an environment of its own, from the interpreter's first line on."""
 
     def run(*arguments: object, **more: str) -> subprocess.CompletedProcess[str]:
+        given = [str(argument) for argument in arguments]
+        if not more:
+            output = tmp_path_factory.mktemp("output")
+            return warm_commands.run(given, cwd=folder, env=environment, output=output)
         return subprocess.run(
-            [*OXBOW, *map(str, arguments)],
+            [*OXBOW, *given],
             cwd=folder,
             env=environment | more,
             capture_output=True,

@@ -1,6 +1,7 @@
 """Missions of several vehicles on the command line: planned, evaluated, compared and drawn."""
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -14,11 +15,21 @@ EXAMPLES = Path(__file__).parents[2] / "docs/examples"
 TREAT, FLEET = EXAMPLES / "treat.json", EXAMPLES / "fleet.json"
 
 
-@pytest.fixture
-def treated(oxbow):
-    result = oxbow("plan", TREAT, "--local", "-o", "treated.json")
+@pytest.fixture(scope="module")
+def treated_once(warm_commands, tmp_path_factory):
+    """The table that `oxbow plan` prints, and the file that it writes."""
+    folder = tmp_path_factory.mktemp("treated")
+    command = ["plan", str(TREAT), "--local", "-o", "treated.json"]
+    result = warm_commands.run(command, cwd=folder, env=os.environ | {"COLUMNS": "160"}, output=folder)
     assert result.returncode == 0, result.stderr
-    return result.stdout
+    return result.stdout, (folder / "treated.json").read_bytes()
+
+
+@pytest.fixture
+def treated(folder, treated_once):
+    table, file = treated_once
+    (folder / "treated.json").write_bytes(file)
+    return table
 
 
 def test_the_table_tells_what_each_vehicle_does_and_what_is_left(treated):

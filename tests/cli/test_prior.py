@@ -32,7 +32,8 @@ def planned(oxbow, folder, *options):
     return json.loads((folder / "planned.json").read_text())
 
 
-def test_the_plan_keeps_the_prior_and_tells_the_kriging_variance(oxbow, folder, prior):
+def test_the_plan_keeps_the_prior_and_tells_the_kriging_variance(oxbow, folder, pond, prior):
+    (folder / "pond.json").write_text(json.dumps(pond(Master_length=6000.0)))
     mission = planned(oxbow, folder, "--local", "--prior", prior.name)
     assert mission["PriorModel"] == PRIOR
     measures = mission["Plan"]["certificate"]

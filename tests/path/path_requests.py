@@ -1,17 +1,19 @@
 """Requests for the path stage, made by the real stages before it."""
 
+import itertools
 import math
 
 import numpy as np
 import shapely
 from shapely import Polygon
 
-from oxbow.contracts import ContourRequest, DecomposeRequest, Method, PathRequest, Place
+from oxbow.contracts import ContourRequest, DecomposeRequest, Method, PathPlan, PathRequest, Place
 from oxbow.errors import renamed
 from oxbow.recording import discard
 from oxbow.spacing import nominal_spacing_m
 from oxbow_contour.service import handle as contour
 from oxbow_decomposition.service import handle as decompose
+from oxbow_path.service import planned
 
 
 def lake(seed: int, *, roughness: float = 0.3, vertices: int = 150, radius_m: float = 1000.0) -> Polygon:
@@ -71,3 +73,13 @@ def request(
         min_spacing_m=min_spacing_m,
         time_limit_s=time_limit_s,
     )
+
+
+def soon_planned(asked: PathRequest, steps: int = 2) -> PathPlan:
+    """The plan of a request with a time limit, of which each step of an improvement takes the same part.
+
+    A path is improved by as many steps on any machine, whatever else that does.
+    """
+    assert asked.time_limit_s is not None
+    taken = itertools.count()
+    return planned(asked, lambda: next(taken) >= steps, discard)
