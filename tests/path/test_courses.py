@@ -77,6 +77,26 @@ def test_once_round_a_moat_closes(method, laps):
     assert farthest_m(plan, asked) <= 9.0
 
 
+@pytest.mark.parametrize(
+    ("laps", "method"), [(0.8, Method.TRANSECT), (1.2, Method.WATERSHED), (1.6, Method.TRANSECT)]
+)
+def test_one_way_round_a_moat_uses_its_length(laps, method):
+    moat = box(0, 0, 300, 200).difference(box(12, 12, 288, 188))
+    asked = request(
+        moat,
+        spacings=laps * 952 / np.sqrt(moat.area),
+        safety=0.02,
+        launch=(6, 100),
+        recovery=(294, 100),
+        method=method,
+    )
+    plan = handle(asked, discard)
+    require_sound(plan, asked)
+    # Half the moat is passed once; the other half costs twice its length, from either end.
+    left = asked.space.free.difference(plan.path.buffer(12.0)).area / asked.space.free.area
+    assert left <= max(0.0, (1.5 - laps) / 2) + 0.05
+
+
 def test_half_a_moat_is_named():
     moat = box(0, 0, 300, 200).difference(box(12, 12, 288, 188))
     asked = request(moat, spacings=0.5 * 952 / np.sqrt(moat.area), safety=0.02, launch=(6, 100))

@@ -140,11 +140,40 @@ def _part(line: LineString, start_m: float, end_m: float) -> LineString:
 
 def _round(path: LineString, out: LineString, waters: Waters, half_width_m: float) -> LineString | None:
     """The path led round a strip along a line that starts on it; None where it crosses the strip repeatedly."""
-    strip = largest(out.buffer(half_width_m, quad_segs=QUAD_SEGS).intersection(waters.free))
+    strip = _strip(out, waters, half_width_m)
+    held = [shapely.covers(strip, end) for end in shapely.points([path.coords[0], path.coords[-1]])]
+    if held == [True, False] and not _is_leg(path, waters):
+        longer = _from_end(path, out, waters, half_width_m)
+    elif held == [False, True] and not _is_leg(path.reverse(), waters):
+        longer = _from_end(path.reverse(), out, waters, half_width_m)
+        longer = None if longer is None else longer.reverse()
+    else:
+        longer = _past(path, strip)
+    return longer if longer is not None and longer.is_simple else None
+
+
+def _strip(out: LineString, waters: Waters, half_width_m: float) -> Polygon:
+    return largest(out.buffer(half_width_m, quad_segs=QUAD_SEGS).intersection(waters.free))
+
+
+def _is_leg(path: LineString, waters: Waters) -> bool:
+    """Whether a path begins outside the free space."""
+    first = LineString(path.coords[:2])
+    return not shapely.covers(waters.passable.free_and_rounding, first)
+
+
+def _crossing(path: LineString, strip: Polygon) -> LineString | None:
+    """Where a path crosses a strip; None unless it does so once."""
     if strip.is_empty or strip.interiors:
         return None
     crossed = shapely.line_merge(path.intersection(strip))
-    if not isinstance(crossed, LineString) or crossed.length < ROUNDING_M:
+    return crossed if isinstance(crossed, LineString) and crossed.length >= ROUNDING_M else None
+
+
+def _past(path: LineString, strip: Polygon) -> LineString | None:
+    """A path led round a strip that it crosses."""
+    crossed = _crossing(path, strip)
+    if crossed is None:
         return None
     start_m, end_m = sorted(path.project(shapely.points(crossed.coords[i])) for i in (0, -1))
     if end_m - start_m > crossed.length + ROUNDING_M:
@@ -152,12 +181,36 @@ def _round(path: LineString, out: LineString, waters: Waters, half_width_m: floa
         return None
     head, tail = (shapely.get_coordinates(_part(path, *ends)) for ends in ((0.0, start_m), (end_m, path.length)))
     longer = LineString(np.vstack([head, _way_round(strip, head[-1], tail[0]), tail]))
-    longer = shapely.remove_repeated_points(longer, ROUNDING_M)
-    return longer if longer.is_simple else None
+    return LineString(shapely.remove_repeated_points(longer, ROUNDING_M).coords)
+
+
+def _from_end(path: LineString, out: LineString, waters: Waters, half_width_m: float) -> LineString | None:
+    """A path that begins in a strip, led out along its middle first, and back along its border."""
+    start = Point(path.coords[0])
+    onward = shapely.get_coordinates(_part(out, out.project(start), out.length))
+    out = LineString(shapely.remove_repeated_points(LineString(np.vstack([path.coords[0], onward])), ROUNDING_M))
+    strip = _strip(out, waters, half_width_m)
+    crossed = _crossing(path, strip)
+    if crossed is None or not shapely.covers(strip, out):
+        return None
+    leaves_m = max(path.project(shapely.points(crossed.coords[i])) for i in (0, -1))
+    if leaves_m > crossed.length + ROUNDING_M:
+        return None
+    tail = shapely.get_coordinates(_part(path, leaves_m, path.length))
+    ring = LineString(strip.exterior)
+    turn = shapely.get_coordinates(shapely.shortest_line(Point(out.coords[-1]), ring))[1]
+    back = _way_along(strip, turn, tail[0], longer=False)
+    longer = LineString(np.vstack([shapely.get_coordinates(out), back, tail]))
+    return LineString(shapely.remove_repeated_points(longer, ROUNDING_M).coords)
 
 
 def _way_round(strip: Polygon, start: FloatArray, end: FloatArray) -> FloatArray:
     """The longer way along a strip's border from one of its places to another, without the two."""
+    return _way_along(strip, start, end, longer=True)
+
+
+def _way_along(strip: Polygon, start: FloatArray, end: FloatArray, *, longer: bool) -> FloatArray:
+    """The longer or shorter way along a strip's border from one of its places to another, without the two."""
     ring = LineString(strip.exterior)
     first_m, last_m = sorted(ring.project(Point(place)) for place in (start, end))
     between = shapely.get_coordinates(_part(ring, first_m, last_m))
@@ -167,6 +220,6 @@ def _way_round(strip: Polygon, start: FloatArray, end: FloatArray) -> FloatArray
             shapely.get_coordinates(_part(ring, 0.0, first_m)) if first_m > 0.0 else between[:0],
         ]
     )
-    way = between if last_m - first_m >= ring.length / 2 else around
+    way = between if (last_m - first_m >= ring.length / 2) == longer else around
     is_forward = np.hypot(*(way[0] - start)) <= np.hypot(*(way[-1] - start))
     return way if is_forward else way[::-1]

@@ -31,7 +31,7 @@ WAYS = 4.0
 REACH = 0.5
 """Water nearer to the course than this, in spacings, needs no detour."""
 
-FAR = 1.0
+FAR = 0.75
 """Where length is plentiful, water farther from a path than this, in spacings, gets a detour."""
 
 EVENNESS_QUANTILE = 0.95
