@@ -19,7 +19,7 @@ from oxbow.mission import read_mission
 from oxbow.recording import discard
 from oxbow.site import Site
 from oxbow.testing import nasty_polygons
-from oxbow_assignment.partition import BALANCE, Partition, balanced_partition, wavefront_partition
+from oxbow_assignment.partition import BALANCE, Partition, balanced_partition, rebalanced, wavefront_partition
 from oxbow_contour.service import handle as contour
 from real_lakes import MISSIONS, needs_missions
 
@@ -148,6 +148,33 @@ def test_vehicles_that_start_together_are_spread():
     partition = wavefront_partition(mesh, [(1.0, 50.0)] * 2)
     assert mesh.centroids[partition.seeds[1], 0] > 280
     require_shares(partition, box(0, 0, 300, 100))
+
+
+@pytest.mark.parametrize("lost", [0, 1, 2])
+def test_who_lost_all_within_reach_takes_up_a_share_again(lost):
+    """Ranges end where the others are: what one had is out of its reach now, and all it reaches is theirs."""
+    water = box(0, 0, 300, 100)
+    starts = [(10.0, 50.0), (150.0, 50.0), (290.0, 50.0)]
+    before = balanced_partition(mesh_for(water, 3), starts)
+    allowed = np.ones((3, len(before.mesh)), dtype=bool)
+    allowed[lost] = np.hypot(*(before.mesh.centroids - starts[lost - 1]).T) < 45.0
+    assert not (allowed[lost] & (before.share == lost)).any()
+    after = rebalanced(before, np.ones(3), allowed)
+    require_shares(after, water)
+    assert after.areas_m2[lost] > 0.0
+    assert allowed[lost][after.share == lost].all()
+
+
+def test_every_vehicle_has_a_share_of_the_little_that_all_reach():
+    water = box(0, 0, 300, 100)
+    mesh = mesh_for(water, 4)
+    near = mesh.centroids[:, 0] < 40.0
+    allowed = np.array([near, near, near, np.ones(len(mesh), dtype=bool)])
+    partition = balanced_partition(mesh, [(1.0, 50.0)] * 4, None, allowed)
+    require_shares(partition, water)
+    assert sorted(set(partition.share.tolist())) == [0, 1, 2, 3]
+    for vehicle in range(3):
+        assert near[partition.share == vehicle].all()
 
 
 def test_one_vehicle_gets_all():

@@ -115,6 +115,22 @@ def test_lanes_are_as_narrow_as_the_water():
     assert (path - free.buffer(0.01)).is_empty
 
 
+CREEK = shapely.union_all([box(-100, 192, 1, 208), box(-100, 192, -84, 320)])
+"""It leads round a corner; 6 m of its 16 are free: legs may run there, but no middle of theirs 4 m from its rim."""
+
+
+@pytest.mark.parametrize("start", [(-92.0, 310.0), (-92.0, 250.0), (-60.0, 200.0)])
+def test_once_in_free_space_legs_keep_to_it(start):
+    """The shortest water cuts the corner."""
+    water = LAKE | CREEK
+    free = water.buffer(-5.0, join_style="mitre")
+    space = FreeSpace(free=free, water=water, tolerance_m=1.0, compression=1.0)
+    share = free & box(600, 0, 1000, 400)
+    path = joined(Harbour(space, SPACING_M).approach(share, vehicle(start)), start, start)
+    assert free.covers(Point(start))
+    assert (path - free.buffer(0.01)).is_empty
+
+
 def test_water_without_a_way_to_the_share_is_refused():
     apart = box(0, 0, 100, 100)
     space = FreeSpace(

@@ -280,6 +280,34 @@ def test_no_leg_out_of_a_creek_leads_over_land(given):
     assert any("lies in narrow water" in text for text in completed.plan.warnings)
 
 
+BEND = ((400, 100), (512, 100), (512, 200), (700, 200), (700, 212), (500, 212), (500, 112), (400, 112))
+BASINS = contour(
+    (0, 0), (400, 0), *BEND[:4], (700, 0), (1000, 0), (1000, 300), (700, 300), *BEND[4:], (400, 300), (0, 300)
+)
+"""Two basins, and a strait 12 m wide between them that leads round two corners."""
+
+
+@pytest.mark.parametrize("launch", [(10, 1), (506, 150), (499, 112)], ids=["basin", "strait", "bend"])
+def test_no_leg_through_a_strait_is_nearer_to_the_shore_than_safety(launch):
+    """Shares lie behind narrows and corners, which legs there and home must not cut."""
+    given = mission(
+        "map",
+        boats("master", 3, Length=5_000.0),
+        None,
+        BoundingBox=BASINS,
+        ForbiddenZones=[],
+        LaunchPoint=at(*launch),
+        Safety=4.0,
+        Minimal_spatial_rate=30.0,
+    )
+    completed, calls = planned(given)
+    east = [max(position.long for position in path.path) > at(720, 0)["long"] for path in completed.paths]
+    west = [min(position.long for position in path.path) < at(380, 0)["long"] for path in completed.paths]
+    assert len(calls.shares) == 3
+    assert any(east)
+    assert any(west)
+
+
 def test_danger_zones_are_gone_round_and_the_danger_is_told():
     """The straight way to the east leads through a ferry's lane, which ends 40 m from the northern shore."""
     pond, launch = contour((0, 0), (800, 0), (800, 300), (0, 300)), at(10, 150)
