@@ -116,7 +116,7 @@ def test_lanes_are_as_narrow_as_the_water():
 
 
 CREEK = shapely.union_all([box(-100, 192, 1, 208), box(-100, 192, -84, 320)])
-"""It leads round a corner; 6 m of its 16 are free: legs may run there, but no middle of theirs 4 m from its rim."""
+"""It leads round a corner; 6 m of its 16 are free: legs may run there, but no lanes of theirs 4 m from the rim."""
 
 
 @pytest.mark.parametrize("start", [(-92.0, 310.0), (-92.0, 250.0), (-60.0, 200.0)])

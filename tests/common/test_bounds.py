@@ -59,7 +59,7 @@ def value_of(given: Mission, field: str) -> float:
 
 def planned(**fields) -> Mission:
     """By legs far apart, which are soon planned."""
-    options = PlanOptions(method=Method.TRANSECT, time_limit_s=0.01)
+    options = PlanOptions(method=Method.TRANSECT, time_limit_s=1e-3)
     return plan_mission(mission(Minimal_spatial_rate=500.0, **fields), options, call=local_call())
 
 

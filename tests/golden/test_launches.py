@@ -19,6 +19,8 @@ LAKE = box(0, 0, 60, 40)
 CREEK = LAKE | box(-40, 20, 1, 22) | box(-40, 20, -38, 35)
 BANK_X = -38.0
 SHORE_M = 0.01
+AT_ONCE_S = 1e-3
+"""So soon an improvement ends as it begins, on any machine."""
 MASTERS = [{"Name": name, "Role": "master", "Length": 220.0} for name in "abc"]
 
 
@@ -44,7 +46,7 @@ def mission(outline: Polygon, launch, *, zones=(), recovery=None, length_m=450.0
     return parse_mission(json.dumps(given | fields).encode())
 
 
-def planned(given: Mission, method: Method = Method.TRANSECT, time_limit_s: float | None = 0.2) -> Mission:
+def planned(given: Mission, method: Method = Method.TRANSECT, time_limit_s: float | None = AT_ONCE_S) -> Mission:
     return plan_mission(given, PlanOptions(method=method, time_limit_s=time_limit_s), call=local_call())
 
 

@@ -7,8 +7,9 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 from path_requests import lake, request
-from shapely import LinearRing, LineString, Point, Polygon, box
+from shapely import LineString, Point, Polygon, box
 
 from oxbow.contracts import PathRequest
 from oxbow.errors import Infeasible, Internal
@@ -294,10 +295,16 @@ def test_what_must_not_leave_the_stage_is_stopped(path, message):
         require_conforming(LineString(path), asked)
 
 
-def test_a_sound_path_passes():
+def test_a_sound_path_passes_up_to_each_rule():
     asked: PathRequest = request(WATER, spacings=15, launch=(0.0, 300.0), recovery=(0.0, 301.0))
-    require_conforming(LineString([(0, 300), (500, 300), (500, 310), (0, 301)]), asked)
-    assert LinearRing(asked.space.free.exterior).is_simple
+    east = asked.space.free.bounds[2]
+    path = LineString([(0, 300), (east, 300), (east, 310), (0, 301)])
+    require_conforming(path, asked)
+    require_conforming(path, replace(asked, length_m=path.length))
+    with pytest.raises(Internal, match="m long"):
+        require_conforming(path, replace(asked, length_m=0.999 * path.length))
+    with pytest.raises(Internal, match="leaves the free space"):
+        require_conforming(LineString([(0, 300), (east + 0.1, 300), (east, 310), (0, 301)]), asked)
 
 
 def test_a_ring_that_shows_only_one_side_of_a_corner_is_opened_beside_it():

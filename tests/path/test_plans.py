@@ -73,18 +73,18 @@ def test_launch_inside_the_water(seed):
 @pytest.mark.parametrize("spacings", [3.0, 9.0])
 @pytest.mark.parametrize("method", Method)
 def test_nasty_shapes(name, spacings, method):
+    """Only slivers, which are narrower than twice the safety distance, are refused."""
     water = nasty_polygons()[name]
-    try:
-        asked = request(water, spacings=spacings, method=method, time_limit_s=1.0)
-        plan = soon_planned(asked)
-    except Infeasible as error:
-        assert any(name in str(error) for name in ("Master_length", "Safety", "LaunchPoint"))
-    else:
-        require_sound(plan, asked)
+    if "sliver" in name:
+        with pytest.raises(Infeasible, match="Safety: "):
+            request(water, spacings=spacings)
+        return
+    asked = request(water, spacings=spacings, method=method, time_limit_s=1.0)
+    require_sound(soon_planned(asked), asked)
 
 
 @pytest.mark.parametrize("where", ["same", "apart", "inside"])
-@pytest.mark.parametrize("spacings", [2.0, 8.0, 40.0])
+@pytest.mark.parametrize("spacings", [2.0, 8.0, 30.0])
 @pytest.mark.parametrize(
     "water",
     [
@@ -105,6 +105,7 @@ def test_short_and_long_paths(water, spacings, where):
     except Infeasible as error:
         assert f"{asked.length_m:.6g} m" in str(error)
         assert where != "same"
+        assert spacings == 2.0
     else:
         require_sound(plan, asked)
 

@@ -160,10 +160,7 @@ def test_paths_over_lakes_are_sound_and_use_their_length(seed, spacings, safety)
     "name", [name for name in sorted(nasty_polygons()) if "sliver" not in name and "grid" not in name][::3]
 )
 def test_paths_over_nasty_shapes_are_sound(name):
-    try:
-        planned(request(nasty_polygons()[name], spacings=8.0))
-    except Infeasible as error:
-        assert "Master_length" in str(error) or "Safety" in str(error)
+    planned(request(nasty_polygons()[name], spacings=8.0))
 
 
 def test_the_refined_path_is_sound_and_shown():
