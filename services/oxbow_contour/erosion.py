@@ -16,14 +16,11 @@ __all__ = ["erode"]
 RUN = 8
 """Edges of the shore that are dilated together."""
 
-QUAD_SEGS = 16
-"""Chords that stand for a quarter of a circle."""
-
-# GEOS lets a chord of a round corner span up to 1.5 times its share; its middle is nearer by this factor.
-CHORD = math.cos(1.5 * math.pi / 2 / QUAD_SEGS / 2)
+CHORDS, MOST_CHORDS = 16, 128
+"""Chords that stand for a quarter of a circle: the fewest, and the most that a small excess can ask for."""
 
 
-def erode(water: Sequence[Polygon | MultiPolygon], distance_m: float) -> list[Polygon]:
+def erode(water: Sequence[Polygon | MultiPolygon], distance_m: float, excess_m: float = math.inf) -> list[Polygon]:
     """Connected parts of the water at least `distance_m` away from its contours, largest first.
 
     The water minus its shore, dilated a few edges at a time. On paper that is a negative buffer of the whole, but
@@ -34,9 +31,29 @@ def erode(water: Sequence[Polygon | MultiPolygon], distance_m: float) -> list[Po
     water
         Valid polygons with disjoint interiors, in metres.
     distance_m
-        Least distance to keep, positive; corners of the shore are kept up to 0.3 % farther away.
+        Least distance to keep, positive.
+    excess_m
+        How much farther away corners of the shore may be kept, as their circles are made of chords. No more than
+        0.3 % of the distance in any case, and no less than 0.005 % of it.
     """
+    chords = _chords(distance_m, excess_m)
     runs = np.concatenate([runs_of(ring, RUN) for ring in rings_of(water)])
-    shore = shapely.union_all(shapely.buffer(runs, distance_m / CHORD, quad_segs=QUAD_SEGS))
+    shore = shapely.union_all(shapely.buffer(runs, distance_m / _nearest(chords), quad_segs=chords))
     parts = shapely.get_parts(shapely.difference(np.array(water, dtype=object), shore))
     return sorted((part for part in parts if part.area > 0), key=lambda part: (-part.area, part.bounds))
+
+
+def _chords(distance_m: float, excess_m: float) -> int:
+    """The fewest chords a quarter circle, as a power of two, that keep to the excess."""
+    chords = CHORDS
+    while chords < MOST_CHORDS and distance_m / _nearest(chords) - distance_m > excess_m:
+        chords *= 2
+    return chords
+
+
+def _nearest(chords: int) -> float:
+    """The distance of a chord's middle from the centre, in radii.
+
+    GEOS lets a chord of a round corner span up to 1.5 times its share.
+    """
+    return math.cos(1.5 * math.pi / 2 / chords / 2)

@@ -28,7 +28,12 @@ COARSEST, FINEST = 1 / 20, 1 / 2000
 """Bounds, in spacings, on tolerances that are made coarser or finer; what would be finer still is exact."""
 
 SLACK = 1 / 4
-"""How far, in tolerances, eroded contours are simplified once more: their round corners are many short edges."""
+"""How far, in tolerances, eroded contours are simplified once more: their round corners are many short edges.
+Round corners are eroded as far too much, at most.
+"""
+
+EXACT = 1e-4
+"""How much of the largest safety distance may be lost to erosion, relative."""
 
 ROUNDING = 1e-9
 """Of coordinates, relative."""
@@ -111,7 +116,7 @@ def _shrunk(simplified: Simplified, safety_m: float) -> list[Polygon]:
     """
     rounding_m = ROUNDING * simplified.extent_m
     slack_m = SLACK * simplified.tolerance_m + rounding_m
-    parts = erode(simplified.parts, safety_m + simplified.tolerance_m + slack_m + rounding_m)
+    parts = erode(simplified.parts, safety_m + simplified.tolerance_m + slack_m + rounding_m, slack_m)
     return [part for part in shapely.simplify(parts, slack_m) if part.area > 0]
 
 
@@ -124,7 +129,7 @@ def _closes_arms(simplified: Simplified, free: Polygon, safety_m: float, spacing
     if simplified.tolerance_m == 0 or simplified.points_out > MANY_POINTS:
         return False
     least_m = safety_m - simplified.tolerance_m
-    outer = erode(simplified.parts, least_m) if least_m > 0 else simplified.parts
+    outer = erode(simplified.parts, least_m, SLACK * simplified.tolerance_m) if least_m > 0 else simplified.parts
     largest = max(outer, key=shapely.area)
     return not free.buffer(REACH * spacing_m).covers(largest)
 
@@ -135,10 +140,10 @@ def _require_room(water: Sequence[Polygon], safety_m: float, *, is_certain: bool
         if is_certain:
             raise Infeasible("leaves no water wider than rounding errors", where="BoundingBox")
         return
-    precision_m = safety_m / 1000
+    precision_m = EXACT * safety_m
     radius_m = inscribed_radius_m(water, precision_m)
     if is_certain or radius_m + precision_m < safety_m:
-        at_most_m = rounded_down(0.99 * min(radius_m, safety_m))
+        at_most_m = rounded_down((1 - EXACT) * min(radius_m, safety_m), digits=4)
         raise Infeasible(
             f"is {safety_m:g} m, which leaves no water; expected at most {at_most_m:g} m, which leaves some",
             where="Safety",

@@ -42,6 +42,15 @@ def test_what_is_farther_than_the_distance_is_left(water, distance_m):
     assert must_stay.difference(left).area <= 1e-9 * water.area
 
 
+@settings(max_examples=30, deadline=None)
+@given(polygons, st.sampled_from([1e-2, 1e-3, 1e-4]))
+def test_what_is_farther_than_the_distance_and_its_excess_is_left(water, share):
+    distance_m = 20.0
+    left = shapely.union_all(erode([water], distance_m, share * distance_m))
+    must_stay = water.buffer(-(1 + share) * distance_m, quad_segs=512)
+    assert must_stay.difference(left).area <= 1e-9 * water.area
+
+
 @pytest.mark.parametrize("name", nasty_polygons())
 def test_nasty_shapes_erode_to_valid_parts(name):
     water = nasty_polygons()[name]

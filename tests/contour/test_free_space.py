@@ -329,3 +329,19 @@ def test_very_long_contours_are_simplified_more_coarsely():
     assert "too many points" in space.warnings[0]
     assert is_safe(space.free, [outline], 5.0)
     assert space.free.area > 0.93 * np.pi * 995**2
+
+
+@pytest.mark.parametrize("safety_m", [0.2499, 249.9])
+def test_a_safety_distance_just_below_half_the_width_leaves_the_strip_that_is_there(safety_m):
+    water = box(0, 0, 2.0016 * safety_m, 2 * safety_m + 300)
+    space = free_space(water, safety_m=safety_m, spacing_m=20.0)
+    assert_safe(space, water, (), safety_m)
+    assert space.free.bounds[3] - space.free.bounds[1] == pytest.approx(300, abs=0.01 * safety_m)
+
+
+def test_too_large_a_safety_distance_is_refused_with_one_that_leaves_water():
+    water = box(0, 0, 500.1, 800)
+    with pytest.raises(Infeasible, match=r"safety_m = 251 leaves no water; expected at most 250 m") as caught:
+        free_space(water, safety_m=251)
+    assert caught.value.where == "Safety"
+    assert free_space(water, safety_m=250).free.area > 0
