@@ -22,7 +22,7 @@ from shapely.ops import substring
 
 from oxbow.arrays import Geometries
 from oxbow.contracts import Fault, FloatArray, Leg, Place, Rule
-from oxbow.narrows import is_basin, without_narrows
+from oxbow.narrows import DETOUR, direct_leg_m, is_basin, without_narrows
 from oxbow.route.gate_routes import Routes
 from oxbow.tolerances import ROUNDING_M
 
@@ -46,12 +46,6 @@ BASIN_SHARE = 1.05
 
 LOOK_SHARE = 4.0
 """So many safety distances of a safe stretch are looked at to tell a basin from a wide spot of a creek."""
-
-DIRECT_SHARE = 3.5
-"""A leg of so many safety distances is never too long: straight off the shore, with room to come alongside."""
-
-DETOUR = 1.5
-"""A leg may be so many times as long as the shortest way: it runs beside another, and clear of corners."""
 
 RUN = 8
 """Edges of the shore that are looked at together."""
@@ -168,15 +162,18 @@ class Shore:
         return _merged(np.vstack(found))
 
     def _leg_lengths(self, path: LineString, unsafe: FloatArray) -> tuple[float, float]:
-        """How far a path's first and its last leg reach; a path that never comes to open water has none."""
+        """How far a path's first and its last leg reach.
+
+        Of a path that never comes to open water, only what begins and what ends it.
+        """
         out_m = self._reach_m(path, unsafe)
         home_m = self._reach_m(path.reverse(), path.length - unsafe[::-1, ::-1])
         if out_m + home_m < path.length:
             return out_m, home_m
-        ends = unsafe[(unsafe[:, 0] <= ROUNDING_M) | (unsafe[:, 1] >= path.length - ROUNDING_M)]
-        if len(ends) == 2:
-            return float(ends[0, 1]), float(path.length - ends[1, 0])
-        return 0.0, 0.0
+        begins, ends = unsafe[:, 0] <= ROUNDING_M, unsafe[:, 1] >= path.length - ROUNDING_M
+        if (begins & ends).any():
+            return 0.0, 0.0
+        return float(unsafe[begins, 1].sum()), float((path.length - unsafe[ends, 0]).sum())
 
     def _reach_m(self, path: LineString, unsafe: FloatArray) -> float:
         """How far the leg at a path's start reaches: to the first safe stretch in a basin."""
@@ -209,7 +206,7 @@ class Shore:
         """A leg, and what its place makes necessary."""
         water = self._parts[np.argmin(shapely.distance(self._parts, path.interpolate(end.open_m)))]
         unsafe_m, ashore_m = _length_m(unsafe), float(water.distance(Point(end.place)))
-        direct_m = DIRECT_SHARE * self.safety_m + DETOUR * ashore_m
+        direct_m = direct_leg_m(self.safety_m, ashore_m)
         return Leg(
             unsafe_m=unsafe_m,
             ashore_m=_length_m(outside),

@@ -6,7 +6,7 @@ import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-__all__ = ["is_basin", "without_narrows"]
+__all__ = ["DETOUR", "direct_leg_m", "is_basin", "is_thin", "without_narrows"]
 
 MITRE = 5.0
 """Corners of the shore stay as they are down to an angle of 23 degrees; the tips of sharper ones are narrows."""
@@ -14,6 +14,11 @@ MITRE = 5.0
 SURPLUS = 1e-2
 """What is dilated again is dilated by so much more, as a share: the shore is kept, not redrawn beside itself."""
 
+DIRECT_SHARE = 3.5
+"""A leg of so many safety distances is never too long: straight off the shore, with room to come alongside."""
+
+DETOUR = 1.5
+"""A leg may be so many times as long as the shortest way: it runs beside another, and clear of corners."""
 
 THIN = 0.25
 """Free water thinner on average than this share of the least width is no basin."""
@@ -60,7 +65,17 @@ def is_basin(part: Polygon, safety_m: float, width_m: float) -> bool:
     water just as wide as twice the safety distance.
     """
     radius_m = float(shapely.minimum_bounding_radius(part))
-    return radius_m > max(safety_m, width_m) and part.area > THIN * width_m * 2.0 * radius_m
+    return radius_m > max(safety_m, width_m) and not is_thin(part, width_m)
+
+
+def is_thin(part: Polygon, width_m: float) -> bool:
+    """Whether free water is thinner on average than a quarter of a least width: no boat can be held in it."""
+    return bool(part.area <= THIN * width_m * 2.0 * float(shapely.minimum_bounding_radius(part)))
+
+
+def direct_leg_m(safety_m: float, ashore_m: float) -> float:
+    """How long a leg may be near the shore, wherever it leads, from a place so far ashore."""
+    return DIRECT_SHARE * safety_m + DETOUR * ashore_m
 
 
 def _rings(water: Polygon | MultiPolygon) -> tuple[int, int]:

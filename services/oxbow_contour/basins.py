@@ -10,7 +10,7 @@ from shapely import MultiPolygon, Point, Polygon
 
 from oxbow.contracts import ContourRequest, Place
 from oxbow.errors import Infeasible
-from oxbow.narrows import is_basin
+from oxbow.narrows import direct_leg_m, is_basin
 from oxbow.route import Routes
 from oxbow.tolerances import ROUNDING_M
 
@@ -36,21 +36,42 @@ def require_reachable(parts: Sequence[Polygon], water: Polygon, request: Contour
     Raises
     ------
     Infeasible
-        A place lies by another basin; `where` names it as `places[i]`.
+        A place lies by another basin, or there is none, and only narrow water leads from the place to the widest
+        spot; `where` names the place as `places[i]`.
     """
     safety_m, width_m = request.safety_m, request.least_width_m
+    narrow = f"{2 * safety_m:g} m, twice Safety" if 2 * safety_m > width_m else f"{width_m:g} m, Least_width"
+    if not is_basin(parts[0], safety_m, width_m):
+        _require_near(parts[0], water, request, narrow)
     basins = [parts[0], *(part for part in parts[1:] if is_basin(part, safety_m, width_m))]
     if len(basins) == 1:
         return
-    narrow = f"{2 * safety_m:g} m, twice Safety," if 2 * safety_m > width_m else f"{width_m:g} m, Least_width,"
     routes = Routes(water)
     for index, place in enumerate(request.places):
         basin = _first_basin(basins, routes, place)
         if basin is not basins[0]:
             raise Infeasible(
-                f"lies by {basin.area:.0f} m2 of free water that only water narrower than {narrow} connects to"
+                f"lies by {basin.area:.0f} m2 of free water that only water narrower than {narrow}, connects to"
                 f" the largest part, {basins[0].area:.0f} m2; expected a place by the largest part, or a smaller"
                 " Safety",
+                where=f"places[{index}]",
+            )
+
+
+def _require_near(spot: Polygon, water: Polygon, request: ContourRequest, narrow: str) -> None:
+    """Check that the places are beside the only free water there is, a spot too small for a basin.
+
+    Raises
+    ------
+    Infeasible
+        One is not: its leg would be most of the path.
+    """
+    for index, place in enumerate(request.places):
+        way_m = spot.distance(Point(place))
+        if way_m > direct_leg_m(request.safety_m, water.distance(Point(place))):
+            raise Infeasible(
+                f"is {way_m:.0f} m from the only free water, {spot.area:.2g} m2, and all between is narrower than"
+                f" {narrow}; expected a smaller Safety",
                 where=f"places[{index}]",
             )
 

@@ -9,12 +9,12 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from oxbow.errors import Infeasible, Internal
+from oxbow.errors import Internal
 from oxbow_contour.erosion import erode
 from oxbow_contour.simplification import Simplified, simplify
-from oxbow_contour.verification import inscribed_radius_m, is_safe, rounded_down
+from oxbow_contour.verification import inscribed_radius_m, is_safe
 
-__all__ = ["MANY_POINTS", "Eroded", "default_tolerance_m", "erode_water"]
+__all__ = ["EXACT", "MANY_POINTS", "Eroded", "default_tolerance_m", "erode_water"]
 
 REACH = 0.25
 """How far, in spacings, water that erosion may leave can be from the free space; farther, it is an arm lost."""
@@ -41,7 +41,10 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Eroded:
-    """The connected parts of the free space, largest first, and the contours that they were eroded from."""
+    """The connected parts of the free space, largest first, and the contours that they were eroded from.
+
+    There are none where the safety distance leaves nothing.
+    """
 
     parts: tuple[Polygon, ...]
     simplified: Simplified
@@ -73,8 +76,6 @@ def erode_water(
 
     Raises
     ------
-    Infeasible
-        Nothing is left at this safety distance.
     Internal
         The result is not safe, not even from the true contours.
     """
@@ -86,7 +87,8 @@ def erode_water(
     while True:
         parts = _shrunk(simplified, safety_m)
         if not parts:
-            _require_room(water, safety_m, is_certain=simplified.tolerance_m == 0)
+            if simplified.tolerance_m == 0 or not _has_room(water, safety_m):
+                return Eroded(parts=(), simplified=simplified)
         elif is_safe(parts[0], water, safety_m):
             if not (may_refine and _closes_arms(simplified, parts[0], safety_m, spacing_m)):
                 return Eroded(parts=tuple(parts), simplified=simplified, warnings=_warnings(simplified, asked_m))
@@ -134,20 +136,10 @@ def _closes_arms(simplified: Simplified, free: Polygon, safety_m: float, spacing
     return not free.buffer(REACH * spacing_m).covers(largest)
 
 
-def _require_room(water: Sequence[Polygon], safety_m: float, *, is_certain: bool) -> None:
-    """Raise `Infeasible` where no circle of that radius fits into the water, or it is certain already."""
-    if safety_m == 0:
-        if is_certain:
-            raise Infeasible("leaves no water wider than rounding errors", where="BoundingBox")
-        return
+def _has_room(water: Sequence[Polygon], safety_m: float) -> bool:
+    """Whether a circle of that radius fits into the water."""
     precision_m = EXACT * safety_m
-    radius_m = inscribed_radius_m(water, precision_m)
-    if is_certain or radius_m + precision_m < safety_m:
-        at_most_m = rounded_down((1 - EXACT) * min(radius_m, safety_m), digits=4)
-        raise Infeasible(
-            f"is {safety_m:g} m, which leaves no water; expected at most {at_most_m:g} m, which leaves some",
-            where="Safety",
-        )
+    return inscribed_radius_m(water, precision_m) + precision_m >= safety_m > 0.0
 
 
 def _warnings(simplified: Simplified, asked_m: float) -> tuple[str, ...]:

@@ -11,12 +11,13 @@ from shapely import MultiPolygon, Polygon
 
 from oxbow.contracts import ContourRequest, DroppedPart, FreeSpace
 from oxbow.errors import Infeasible
-from oxbow.narrows import is_basin, without_narrows
+from oxbow.narrows import is_basin, is_thin, without_narrows
 from oxbow.recording import Layer, LayerKind, Show
 from oxbow.tolerances import ON_SHORE_M
 from oxbow_contour.basins import require_reachable
-from oxbow_contour.free_space import MANY_POINTS, Eroded, erode_water
+from oxbow_contour.free_space import EXACT, MANY_POINTS, Eroded, erode_water
 from oxbow_contour.home import home_water
+from oxbow_contour.verification import inscribed_radius_m, rounded_down
 from oxbow_contour.water import true_water
 
 __all__ = ["handle"]
@@ -93,14 +94,36 @@ def _eroded(home: Polygon, request: ContourRequest) -> Eroded:
     """The free space of the water that is planned on, within reach of every place."""
     eroded = erode_water([home], request.safety_m, request.spacing_m, request.tolerance_m)
     try:
+        _require_breadth(eroded.parts, home, request)
         require_reachable(eroded.parts, home, request)
     except Infeasible:
         # Simplification may have closed what the safety distance leaves open.
         if eroded.simplified.tolerance_m == 0.0 or shapely.get_num_coordinates(home) > MANY_POINTS:
             raise
         eroded = erode_water([home], request.safety_m, request.spacing_m, tolerance_m=0.0)
+        _require_breadth(eroded.parts, home, request)
         require_reachable(eroded.parts, home, request)
     return eroded
+
+
+def _require_breadth(parts: Sequence[Polygon], home: Polygon, request: ContourRequest) -> None:
+    """Raise `Infeasible` where the safety distance leaves nothing, or no more than a seam.
+
+    In a canal of just twice the safety distance, rounding decides where there is free water, and no boat keeps
+    to the middle so well.
+    """
+    safety_m, width_m = request.safety_m, request.least_width_m
+    if safety_m == 0.0:
+        if not parts:
+            raise Infeasible("leaves no water wider than rounding errors", where="BoundingBox")
+    elif not parts or is_thin(parts[0], width_m):
+        radius_m = min(safety_m, inscribed_radius_m([home], EXACT * safety_m))
+        less_m = rounded_down(max((1.0 - EXACT) * radius_m - width_m / 2, 0.0), digits=4)
+        narrow = f" wider than {width_m:g} m, Least_width" if width_m else ""
+        raise Infeasible(
+            f"is {safety_m:g} m, which leaves no free water{narrow}; expected less, such as {less_m:g} m",
+            where="Safety",
+        )
 
 
 def _other_waters(waters: Sequence[Polygon], home: Polygon, request: ContourRequest) -> Iterator[DroppedPart]:

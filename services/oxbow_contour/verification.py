@@ -52,6 +52,8 @@ def inscribed_radius_m(water: Sequence[Polygon], precision_m: float) -> float:
 
 
 def rounded_down(value: float, digits: int = 3) -> float:
-    """A positive number, rounded down to so many significant digits."""
+    """A number that is not negative, rounded down to so many significant digits."""
+    if value == 0.0:
+        return 0.0
     unit = 10.0 ** (math.floor(math.log10(value)) + 1 - digits)
     return float(f"{math.floor(value / unit) * unit:.{digits}g}")

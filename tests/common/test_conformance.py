@@ -152,3 +152,13 @@ def test_the_water_of_a_leg_is_that_where_it_ends_though_other_water_is_as_near(
     path = [(-68.0, 100.0), (50.0, 100.0), (50.0, 150.0)]
     found = Shore(halves, SAFETY_M).conduct(LineString(path), path[0], path[-1])
     assert not found.faults
+
+
+def test_a_creek_as_wide_as_twice_the_safety_distance_does_not_lose_the_other_leg():
+    """The way there is as good as safe, and of no basin; the other place lies at the creek's blind end."""
+    creek = [(410, 100), (380, 100), (380, 20), (20, 20), (20, 120), (385, 120), (385, 100.05), (699, 100.05)]
+    water = box(0, 0, 400, 200).union(box(400, 90, 700, 110))
+    for path in (creek, creek[::-1]):
+        found = conduct(path, water)
+        assert found.faults == ()
+        assert sorted(round(leg.unsafe_m, 1) for leg in found.legs) == [0.0, 8.9]

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from shapely import MultiPolygon, Point, Polygon, box
+from shapely import LineString, MultiPolygon, Point, Polygon, box
 
 from oxbow.testing import nasty_polygons
 from oxbow_contour.erosion import erode
@@ -40,6 +40,20 @@ def test_what_is_farther_than_the_distance_is_left(water, distance_m):
     left = shapely.union_all(erode([water], distance_m))
     must_stay = water.buffer(-1.01 * distance_m, quad_segs=64)
     assert must_stay.difference(left).area <= 1e-9 * water.area
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(2, 9), st.sampled_from([1e-5, 1.0]))
+@example(seed=567, edges=9, excess_m=1.0)
+@example(seed=204, edges=6, excess_m=1e-5)
+def test_short_edges_beside_long_ones_are_kept_away_from_as_well(seed, edges, excess_m):
+    """GEOS alone leaves out some of the distance beside such a shore."""
+    rng = np.random.default_rng(seed)
+    steps = rng.uniform(-1, 1, (edges, 2)) * 10 ** rng.uniform(-2, 2, (edges, 1))
+    wall = LineString(np.cumsum(steps, axis=0)).buffer(1e-3, cap_style="flat", join_style="mitre")
+    water = box(*wall.bounds).buffer(20).difference(wall)
+    for part in erode([water], 5.0, excess_m):
+        assert part.boundary.distance(water.boundary) >= 5.0 * (1 - EXACT)
 
 
 @settings(max_examples=30, deadline=None)

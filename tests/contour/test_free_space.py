@@ -3,6 +3,7 @@ import pytest
 import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from msgspec import structs
 from shapely import Point, Polygon, affinity, box
 
 from oxbow.codec import encode
@@ -152,13 +153,13 @@ def test_the_safety_distance_named_when_infeasible_leaves_water(site, safety_m):
         if error.where != "Safety":
             return
         assert f"{safety_m:g}" in error.message
-        named_m = float(error.message.split("at most ")[1].split(" m")[0])
+        named_m = float(error.message.split("such as ")[1].split(" m")[0])
         assert 0 < named_m < safety_m
         assert free_space(outline, zones, named_m, 20.0).free.area > 0
 
 
 def test_the_safety_distance_named_is_nearly_the_largest():
-    with pytest.raises(Infeasible, match="at most 49") as raised:
+    with pytest.raises(Infeasible, match=r"such as 49\.9") as raised:
         free_space(SQUARE, safety_m=51.0)
     assert raised.value.where == "Safety"
 
@@ -341,7 +342,32 @@ def test_a_safety_distance_just_below_half_the_width_leaves_the_strip_that_is_th
 
 def test_too_large_a_safety_distance_is_refused_with_one_that_leaves_water():
     water = box(0, 0, 500.1, 800)
-    with pytest.raises(Infeasible, match=r"safety_m = 251 leaves no water; expected at most 250 m") as caught:
+    with pytest.raises(
+        Infeasible, match=r"251 m, which leaves no free water; expected .* such as 250 m"
+    ) as caught:
         free_space(water, safety_m=251)
     assert caught.value.where == "Safety"
     assert free_space(water, safety_m=250).free.area > 0
+
+
+def test_a_seam_of_free_water_is_refused_with_a_safety_distance_that_leaves_more():
+    """Rounding decides where in it there is any, and no boat keeps to the middle so well."""
+    asked = ContourRequest(
+        outline=box(0, 0, 10, 600), safety_m=4.999, spacing_m=10.0, least_width_m=0.1, places=((5.0, 0.0),)
+    )
+    with pytest.raises(
+        Infeasible, match=r"4.999 m leaves no free water wider than 0.1 m.* such as 4.948"
+    ) as caught:
+        handle(asked, discard)
+    assert caught.value.where == "Safety"
+    assert handle(structs.replace(asked, safety_m=4.948), discard).free.area == pytest.approx(61, rel=0.05)
+
+
+def test_a_wide_spot_is_no_water_to_be_reached_from_far_up_a_narrow_canal():
+    canal = box(0, 0, 400, 10).union(box(382, 9, 388, 11.5))
+    near, far = ((375.0, 5.0),), ((5.0, 5.0),)
+    asked = ContourRequest(outline=canal, safety_m=5.0, spacing_m=10.0, least_width_m=0.1, places=near)
+    assert handle(asked, discard).free.area < 2
+    with pytest.raises(Infeasible, match=r"from the only free water.* than 10 m, twice Safety") as caught:
+        handle(structs.replace(asked, places=far), discard)
+    assert caught.value.where == "places[0]"

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from path_requests import lake, request
 from shapely import LineString, Point, Polygon, box
 
+from oxbow.conformance import strays
 from oxbow.contracts import PathRequest
 from oxbow.errors import Infeasible, Internal
 from oxbow.recording import discard
@@ -358,6 +359,18 @@ def test_the_shortest_way_is_a_plan_whatever_the_method_finds():
     asked = request(water, launch=islet.exterior.coords[1], recovery=(700.0, 0.0), spacings=2.0, safety=0.0)
     plan = handle(asked, discard)
     assert plan.path.length <= asked.length_m
+
+
+@pytest.mark.parametrize("spacings", [2.5, 4.0, 7.0])
+@pytest.mark.parametrize("recovery", [(480.0, 400.0), (300.0, 400.0)], ids=["same islet", "another"])
+def test_legs_leave_and_come_back_to_islets_that_the_ring_is_led_round(recovery, spacings):
+    """Straight from the place to the ring, a leg would run along the islet's shore."""
+    islets = shapely.union_all([box(480, 380, 520, 420), box(280, 380, 300, 420)])
+    water = box(0, 0, 1000, 800).difference(islets)
+    asked = request(water, launch=(520.0, 400.0), recovery=recovery, spacings=spacings, safety=0.0055)
+    plan = handle(asked, discard)
+    assert plan.path.is_simple
+    assert not strays(plan.path, asked.space.free, asked.launch, asked.recovery)
 
 
 def test_a_leg_reaches_a_ring_that_is_farther_away_than_its_entry():

@@ -62,7 +62,6 @@ def _branches(
     gaps: FloatArray, region: Polygon, brush: Brush, routes: Routes, apart_m: float
 ) -> Iterator[LineString]:
     """A branch for each gap that no earlier branch of this round has come near."""
-    index = cKDTree(gaps)
     reached = np.zeros(len(gaps), dtype=bool)
     goals = routes.goals_in(region)
     for number, gap in enumerate(gaps):
@@ -71,8 +70,10 @@ def _branches(
         branch = branch_to(gap, region, routes, goals, brush.half_width_m)
         yield _shortened(branch, min(brush.margin_m, branch.length / 2))
         steps = shapely.get_coordinates(shapely.segmentize(branch, apart_m / 4)) if branch.length else gap[None]
-        for near in index.query_ball_point(steps, apart_m):
-            reached[near] = True
+        # A long branch in fine samples has far more pairs of a step and a gap than either.
+        left = np.flatnonzero(~reached)
+        distance_m, _ = cKDTree(steps).query(gaps[left], distance_upper_bound=apart_m)
+        reached[left[np.isfinite(distance_m)]] = True
         reached[number] = True
 
 

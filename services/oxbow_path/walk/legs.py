@@ -356,13 +356,15 @@ def _open(
     if not _on(inside.exterior, recovery):
         ring = _part(line, start, start - opening_m)
         way = through.between(ring[-1], recovery.leg[-1])
-        yield _chain(launch.leg[:-1], ring, way, recovery.leg[::-1])
+        for out in (launch.leg[:-1], launch.leg):
+            yield _chain(out, ring, way, recovery.leg[::-1])
         return
     near = _part(line, start, end - opening_m / 2)
     far = _part(line, end + opening_m / 2, start - opening_m)
     way = through.between(near[-1], far[-1])
-    yield _chain(launch.leg[:-1], near, way, far[::-1], recovery.leg[-2::-1])
-    yield _chain(launch.leg[:-1], near, way, far[::-1], recovery.leg[::-1])
+    # Straight to the ring and home from it, where the legs end on it or short of it; else by way of their ends.
+    for out, home in itertools.product((launch.leg[:-1], launch.leg), (recovery.leg[-2::-1], recovery.leg[::-1])):
+        yield _chain(out, near, way, far[::-1], home)
 
 
 def _without(region: Polygon, line: LineString, half_width_m: float) -> Polygon:
