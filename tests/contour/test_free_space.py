@@ -342,9 +342,7 @@ def test_a_safety_distance_just_below_half_the_width_leaves_the_strip_that_is_th
 
 def test_too_large_a_safety_distance_is_refused_with_one_that_leaves_water():
     water = box(0, 0, 500.1, 800)
-    with pytest.raises(
-        Infeasible, match=r"251 m, which leaves no free water; expected .* such as 250 m"
-    ) as caught:
+    with pytest.raises(Infeasible, match=r"251 m, which leaves no free water; .* such as 250 m") as caught:
         free_space(water, safety_m=251)
     assert caught.value.where == "Safety"
     assert free_space(water, safety_m=250).free.area > 0
@@ -356,7 +354,7 @@ def test_a_seam_of_free_water_is_refused_with_a_safety_distance_that_leaves_more
         outline=box(0, 0, 10, 600), safety_m=4.999, spacing_m=10.0, least_width_m=0.1, places=((5.0, 0.0),)
     )
     with pytest.raises(
-        Infeasible, match=r"4.999 m leaves no free water wider than 0.1 m.* such as 4.948"
+        Infeasible, match=r"4.999 m, which leaves no free water wider than .* such as 4.948"
     ) as caught:
         handle(asked, discard)
     assert caught.value.where == "Safety"
