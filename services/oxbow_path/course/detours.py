@@ -17,6 +17,7 @@ from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow.tolerances import ROUNDING_M
 from oxbow_path.walk.region import largest
+from oxbow_path.walk.stretch import stretch
 from oxbow_path.walk.trial import Waters
 
 __all__ = ["detoured", "with_detours"]
@@ -130,12 +131,8 @@ def _end_of(out: LineString, length_m: float) -> LineString:
 
 def _part(line: LineString, start_m: float, end_m: float) -> LineString:
     """A line from one distance along it to another; the whole line where these are one place."""
-    points = shapely.get_coordinates(line)
-    at_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    if min(end_m, at_m[-1]) <= start_m:
-        return line
-    ends = np.column_stack([np.interp([start_m, end_m], at_m, axis) for axis in points.T])
-    return LineString(np.vstack([ends[:1], points[(at_m > start_m) & (at_m < end_m)], ends[1:]]))
+    points = stretch(line, start_m, end_m)
+    return LineString(points) if len(points) > 1 else line
 
 
 def _round(path: LineString, out: LineString, waters: Waters, half_width_m: float) -> LineString | None:

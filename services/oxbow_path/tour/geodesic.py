@@ -43,6 +43,9 @@ LEAST_STEP_M = 1e-9
 WIDER = (2.0, 8.0)
 """A search for a way goes so many times as far as the straight line, before it goes everywhere."""
 
+TOGETHER = 64
+"""So many ways are searched for at once: each search copies the graph."""
+
 CHUNK = 256
 """So many sites are sources of one search, to bound its memory."""
 
@@ -126,37 +129,59 @@ class Geodesics:
         """Distances from one site to all, shape (n,)."""
         return np.asarray(dijkstra(self.graph, indices=np.array([site]))[0, : self.count])
 
-    def between_m(self, start: int, goal: int) -> float:
-        """The distance of two sites, found without going much farther."""
-        return float(self._search(start, goal)[0][goal])
+    def between_m(self, starts: Indices, goals: Indices) -> FloatArray:
+        """The distances of pairs of sites, shape (n,), found without going much farther."""
+        return np.array([leg.length_m for leg in self._legs(starts, goals)])
 
     def way(self, order: Sequence[int] | Indices) -> FloatArray:
         """The closed way through the sites in that order, shape (m, 2), its end equal to its start."""
         starts, goals = np.asarray(order), np.roll(order, -1)
         seen = (np.asarray(self.graph[starts, goals]).ravel() > 0.0) | (starts == goals)
-        parts = []
-        for start, goal, straight in zip(starts.tolist(), goals.tolist(), seen.tolist(), strict=True):
-            parts.append([start] if straight else self._between(start, goal)[:-1])
-        parts.append([int(starts[0])])
+        winding = iter(self._legs(starts[~seen], goals[~seen]))
+        parts = [
+            (start,) if straight else next(winding).nodes[:-1]
+            for start, straight in zip(starts.tolist(), seen.tolist(), strict=True)
+        ]
+        parts.append((int(starts[0]),))
         return self.places[np.concatenate(parts).astype(np.intp)]
 
-    def _between(self, start: int, goal: int) -> list[int]:
-        _, previous = self._search(start, goal)
+    def _legs(self, starts: Indices, goals: Indices) -> list[_Leg]:
+        """The shortest ways of pairs of sites: those about as far apart are searched for together."""
+        apart_m = np.hypot(*(self.places[goals] - self.places[starts]).T) + LEAST_STEP_M
+        legs: dict[int, _Leg] = {}
+        nearest_first = np.argsort(apart_m, kind="stable")
+        for first in range(0, len(starts), TOGETHER):
+            left = nearest_first[first : first + TOGETHER]
+            for wider in (*WIDER, np.inf):
+                distance, previous = dijkstra(
+                    self.graph,
+                    indices=starts[left],
+                    return_predecessors=True,
+                    limit=wider * float(apart_m[left].max()),
+                )
+                reached = np.isfinite(distance[np.arange(len(left)), goals[left]])
+                for row in np.flatnonzero(reached).tolist():
+                    pair = int(left[row])
+                    legs[pair] = _Leg.of(distance[row], previous[row], int(starts[pair]), int(goals[pair]))
+                left = left[~reached]
+                if len(left) == 0:
+                    break
+        return [legs[pair] for pair in range(len(starts))]
+
+
+@dataclass(frozen=True)
+class _Leg:
+    """A way between two sites: its length, and the places that it passes, both sites included."""
+
+    length_m: float
+    nodes: tuple[int, ...]
+
+    @classmethod
+    def of(cls, distance_m: FloatArray, previous: Indices, start: int, goal: int) -> _Leg:
         nodes = [goal]
         while nodes[-1] != start:
             nodes.append(int(previous[nodes[-1]]))
-        return nodes[::-1]
-
-    def _search(self, start: int, goal: int) -> tuple[FloatArray, Indices]:
-        """Distances from a place, and predecessors on the way, as far as another place at least."""
-        straight_m = float(np.hypot(*(self.places[goal] - self.places[start]))) + LEAST_STEP_M
-        for limit_m in (*(wider * straight_m for wider in WIDER), np.inf):
-            distance, previous = dijkstra(
-                self.graph, indices=np.array([start]), return_predecessors=True, limit=limit_m
-            )
-            if np.isfinite(distance[0, goal]):
-                break
-        return distance[0], previous[0]
+        return cls(float(distance_m[goal]), tuple(nodes[::-1]))
 
 
 def _nearest(points: FloatArray, others: FloatArray, count: int) -> Indices:

@@ -115,12 +115,14 @@ def _slit_by_halves(region: Polygon, slits: Geometries) -> Polygon:
 def _is_odd(faces: Geometries, way: FloatArray) -> Mask:
     """Whether a line from a face to infinity crosses the way an odd number of times."""
     inner = shapely.get_coordinates(shapely.point_on_surface(faces))
-    x, y = inner[:, None, 0], inner[:, None, 1]
-    (x0, y0), (x1, y1) = way[:-1].T, way[1:].T
+    ray = np.stack([inner, np.column_stack([np.full(len(inner), way[:, 0].max()), inner[:, 1]])], axis=1)
+    edges = STRtree(np.asarray(shapely.linestrings(np.stack([way[:-1], way[1:]], axis=1))))
+    face, edge = edges.query(shapely.linestrings(ray))
+    (x, y), (x0, y0), (x1, y1) = inner[face].T, way[edge].T, way[edge + 1].T
     spans = (y0 > y) != (y1 > y)
     rise = np.where(y1 == y0, 1.0, y1 - y0)
     right = x0 + (y - y0) / rise * (x1 - x0) > x
-    return np.asarray((spans & right).sum(axis=1) % 2 == 1)
+    return np.asarray(np.bincount(face, spans & right, len(faces)) % 2 == 1)
 
 
 def _meetings(stretches: Geometries) -> Geometries:

@@ -44,8 +44,7 @@ def first_tour(geodesics: Geodesics, limit_m: float) -> Start:
     near = geodesics.near(limit_m)
     legs = np.column_stack([order, np.roll(order, -1)])
     far = legs[np.asarray(near[legs[:, 0], legs[:, 1]]) == 0.0]
-    lengths = np.array([geodesics.between_m(int(a), int(b)) for a, b in far])
-    return Start(order, _joined(near, far, lengths))
+    return Start(order, _joined(near, far, geodesics.between_m(*far.T)))
 
 
 def _round_tree(tree: csr_array[np.float64]) -> Indices:

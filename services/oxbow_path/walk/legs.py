@@ -29,6 +29,7 @@ from oxbow.route import Landing, way_to
 from oxbow.route.gate_routes import Routes, taut
 from oxbow.tolerances import HAIR_M, ON_SHORE_M, ROUNDING_M
 from oxbow_path.walk.region import largest
+from oxbow_path.walk.stretch import stretch
 
 __all__ = ["Access", "Passable", "access", "is_plainly_simple", "joined"]
 
@@ -376,9 +377,8 @@ def _part(ring: LineString, start_m: float, end_m: float) -> FloatArray:
     """The stretch of a closed line from one distance along it onward to another, round the seam where need be."""
     start_m, end_m = start_m % ring.length, end_m % ring.length
     if start_m < end_m:
-        return shapely.get_coordinates(substring(ring, start_m, end_m))
-    first, second = substring(ring, start_m, ring.length), substring(ring, 0.0, end_m)
-    return np.vstack([shapely.get_coordinates(first), shapely.get_coordinates(second)])
+        return stretch(ring, start_m, end_m)
+    return np.vstack([stretch(ring, start_m, ring.length), stretch(ring, 0.0, end_m)])
 
 
 def _chain(*parts: FloatArray) -> LineString:
