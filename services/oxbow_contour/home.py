@@ -7,9 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 from shapely import Point, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import ContourRequest
 from oxbow.errors import Infeasible, InvalidMission
+from oxbow.tolerances import ON_SHORE_M, ROUNDING_M
 from oxbow_contour.verification import inscribed_radius_m
 
 __all__ = ["home_water"]
@@ -18,7 +20,7 @@ PRECISION = 1e-3
 """Of the radius of the circle that fits into water, as a share of the safety distance."""
 
 
-def home_water(waters: Sequence[Polygon], request: ContourRequest) -> Polygon:
+def home_water(waters: Sequence[Polygon], request: ContourRequest, narrows: BaseGeometry) -> Polygon:
     """The connected water that is planned on.
 
     It is the nearest to where the first vehicle starts that has room for the safety distance; the largest, where
@@ -31,17 +33,21 @@ def home_water(waters: Sequence[Polygon], request: ContourRequest) -> Polygon:
         At least one; apart from one another, the largest first.
     request
         Its places, each at most its shore tolerance from where a vehicle may go.
+    narrows
+        Water that is none of these, as it is too narrow.
 
     Raises
     ------
     InvalidMission
-        A place lies too far from water that is wide enough; `where` names it as `places[i]`.
+        A place lies too far from water that is wide enough, or behind other land; `where` names it as `places[i]`.
     Infeasible
         A place lies in other water than the first.
     """
     if not request.places:
         return waters[0]
     nearest = [_nearest(waters, request, index) for index in range(len(request.places))]
+    for index, water in enumerate(nearest):
+        _require_no_land_between(water, request, index, narrows)
     home = nearest[0]
     for index, water in enumerate(nearest):
         if water is not home:
@@ -70,6 +76,29 @@ def _nearest(waters: Sequence[Polygon], request: ContourRequest, index: int) -> 
     if len(waters) == 1:
         return near[0]
     return next((water for water in near if _has_room(water, request.safety_m)), near[0])
+
+
+def _require_no_land_between(water: Polygon, request: ContourRequest, index: int, narrows: BaseGeometry) -> None:
+    """Check that no forbidden zone and no other land lies between a place ashore and its water.
+
+    A vehicle may be carried from its place to the water. Beyond a seam of water, however narrow, begins another
+    shore.
+
+    Raises
+    ------
+    InvalidMission
+        The way passes such a seam.
+    """
+    way = shapely.shortest_line(Point(request.places[index]), water)
+    # A little larger, since the ends of an intersection need not lie on the line.
+    land = shapely.get_parts(way.difference(narrows.intersection(way.envelope.buffer(1.0)).buffer(ROUNDING_M)))
+    behind = land[shapely.distance(land, shapely.get_point(way, 0)) > ROUNDING_M]
+    if shapely.length(behind).sum() > ON_SHORE_M:
+        raise InvalidMission(
+            f"lies {way.length:.3g} m from water wider than Least_width = {request.least_width_m:g} m, and behind"
+            " a forbidden zone or other land; expected a place by that water, or less for Least_width",
+            where=f"places[{index}]",
+        )
 
 
 def _has_room(water: Polygon, safety_m: float) -> bool:

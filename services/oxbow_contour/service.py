@@ -52,7 +52,7 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
             f"{request.least_width_m:g} m leaves no water; expected less than the water is wide",
             where="least_width_m",
         )
-    home = home_water(waters, request)
+    home = home_water(waters, request, water.difference(opened))
     eroded = _free_space(home, request, water.area)
     free, *others = eroded.parts
     shapely.prepare(home)

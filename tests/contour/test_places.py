@@ -73,6 +73,15 @@ def test_a_place_too_far_from_wide_water_is_refused():
     assert space((-20.0, 50.02), outline=ditch, least_width_m=0.1).water.bounds[0] == pytest.approx(0, abs=0.05)
 
 
+@pytest.mark.parametrize("safety_m", [0.0, 2.0])
+@pytest.mark.parametrize("x", [-2.0, 0.01], ids=["ashore", "in the seam"])
+def test_a_place_behind_a_zone_that_leaves_a_seam_is_refused(safety_m, x):
+    wall = box(0.02, 20, 10, 80)
+    with pytest.raises(InvalidMission, match=r"places\[0\]: lies .* behind a forbidden zone or other land"):
+        space((x, 50.0), zones=[wall], safety_m=safety_m, least_width_m=0.1)
+    assert space((x, 19.0), zones=[wall], safety_m=safety_m, least_width_m=0.1).water.area > 9_300
+
+
 def test_water_that_is_all_narrow_is_infeasible():
     with pytest.raises(Infeasible, match="least_width_m"):
         space(outline=box(0, 0, 100, 0.05), safety_m=0.0, least_width_m=0.1)

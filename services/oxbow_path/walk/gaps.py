@@ -13,6 +13,7 @@ from shapely.ops import substring
 from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow.route.gate_routes import Routes
+from oxbow.tolerances import ROUNDING_M
 from oxbow_path.walk.probe import Probe
 from oxbow_path.walk.region import Brush, Walk, largest, simply_connected
 
@@ -61,14 +62,16 @@ def _spread(points: FloatArray, apart_m: float) -> Iterator[FloatArray]:
 def _branches(
     gaps: FloatArray, region: Polygon, brush: Brush, routes: Routes, apart_m: float
 ) -> Iterator[LineString]:
-    """A branch for each gap that no earlier branch of this round has come near."""
+    """A branch for each gap that no earlier branch of this round has come near, to the region or such a branch."""
     reached = np.zeros(len(gaps), dtype=bool)
     goals = routes.goals_in(region)
     for number, gap in enumerate(gaps):
         if reached[number]:
             continue
         branch = branch_to(gap, region, routes, goals, brush.half_width_m)
-        yield _shortened(branch, min(brush.margin_m, branch.length / 2))
+        kept = _shortened(branch, min(brush.margin_m, branch.length / 2))
+        yield kept
+        goals = np.union1d(goals, routes.goals_near(kept, ROUNDING_M))
         steps = shapely.get_coordinates(shapely.segmentize(branch, apart_m / 4)) if branch.length else gap[None]
         # A long branch in fine samples has far more pairs of a step and a gap than either.
         left = np.flatnonzero(~reached)
