@@ -2,15 +2,18 @@
 
 import itertools
 import math
+import re
+from typing import Any
 
 import numpy as np
 import shapely
 from shapely import Polygon
 
 from oxbow.contracts import ContourRequest, DecomposeRequest, Method, PathPlan, PathRequest, Place
-from oxbow.errors import renamed
+from oxbow.errors import Infeasible, renamed
 from oxbow.recording import discard
 from oxbow.spacing import nominal_spacing_m
+from oxbow.testing import nasty_polygons
 from oxbow_contour.service import handle as contour
 from oxbow_decomposition.service import handle as decompose
 from oxbow_path.service import planned
@@ -73,6 +76,26 @@ def request(
         min_spacing_m=min_spacing_m,
         time_limit_s=time_limit_s,
     )
+
+
+def nasty_request(name: str, spacings: float, **more: Any) -> PathRequest | None:
+    """A request for a nasty shape; None for those that are rightly refused: any other has to have a path.
+
+    Slivers are narrower than twice the safety distance. Of two basins alike, the launch may be by the one that
+    is taken for the lesser.
+    """
+    water = nasty_polygons()[name]
+    refusal = (
+        "Safety: " if "sliver" in name else "LaunchPoint: lies by .* narrower than" if name == "strait" else None
+    )
+    try:
+        asked = request(water, spacings=spacings, **more)
+    except Infeasible as error:
+        if refusal is None or not re.match(refusal, str(error)):
+            raise
+        return None
+    assert "sliver" not in name
+    return asked
 
 
 def soon_planned(asked: PathRequest, steps: int = 2) -> PathPlan:
