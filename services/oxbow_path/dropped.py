@@ -13,13 +13,17 @@ __all__ = ["dropped_parts"]
 QUAD_SEGS = 4
 """Arcs of the path's surroundings are coarse: they err inwards by 2 % at most, so that no gap is overlooked."""
 
+DETAIL = 0.02
+"""Bends of the path less than this, in reaches, are left out: those of a smooth path are many."""
+
 LEAST_SHARE = 0.1
 """Smaller parts than this share of a square of side `reach_m` are not worth a line, unless they are as long."""
 
 
 def dropped_parts(path: LineString, free: Polygon, reach_m: float) -> tuple[DroppedPart, ...]:
     """The parts of the free space farther than `reach_m` from the path, the largest first."""
-    rest = shapely.get_parts(free.difference(path.buffer(reach_m, quad_segs=QUAD_SEGS)))
+    coarse = path.simplify(DETAIL * reach_m)
+    rest = shapely.get_parts(free.difference(coarse.buffer(reach_m, quad_segs=QUAD_SEGS)))
     is_arm = shapely.minimum_bounding_radius(rest) > reach_m / 2
     rest = rest[is_arm | (shapely.area(rest) > LEAST_SHARE * reach_m**2)]
     return tuple(

@@ -67,11 +67,13 @@ def feet(path: Polyline, points: FloatArray, spacing_m: float) -> Feet:
     best = np.full(len(points), np.inf)
     segment, share = owner[nearest], np.zeros(len(points))
     squared_m2 = np.maximum(path.lengths_m**2, np.finfo(float).tiny)
+    # By axis: sums over pairs take several times as long as sums of two arrays.
+    (px, py), (x, y), (ex, ey) = (np.ascontiguousarray(each.T) for each in (points, path.nodes, edge))
     for step in (0, -1, 1):
         candidate = np.clip(owner[nearest] + step, 0, len(edge) - 1)
-        offset = points - path.nodes[candidate]
-        at = np.clip((offset * edge[candidate]).sum(axis=1) / squared_m2[candidate], 0.0, 1.0)
-        distance2 = ((offset - at[:, None] * edge[candidate]) ** 2).sum(axis=1)
+        ox, oy, cx, cy = px - x[candidate], py - y[candidate], ex[candidate], ey[candidate]
+        at = np.clip((ox * cx + oy * cy) / squared_m2[candidate], 0.0, 1.0)
+        distance2 = (ox - at * cx) ** 2 + (oy - at * cy) ** 2
         nearer = distance2 < best
         best[nearer], segment[nearer], share[nearer] = distance2[nearer], candidate[nearer], at[nearer]
     return Feet(segment, share, np.sqrt(best))

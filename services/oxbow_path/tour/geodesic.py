@@ -40,7 +40,7 @@ TOUCH_M = 1e-6
 LEAST_STEP_M = 1e-9
 """A sparse matrix drops zeros."""
 
-WIDER = (2.0, 8.0)
+WIDER = (1.5, 6.0)
 """A search for a way goes so many times as far as the straight line, before it goes everywhere."""
 
 TOGETHER = 64
@@ -81,6 +81,7 @@ class Shore:
 
     def _in_sight(self, places: FloatArray, pairs: Indices) -> Indices:
         """Those pairs of places between which a straight line stays in the water, and passes no touch."""
+        pairs = np.unique(np.sort(pairs, axis=1), axis=0)
         lines = shapely.linestrings(places[pairs])
         seen = shapely.covers(self.free, lines) & ~shapely.dwithin(lines, self._touches, TOUCH_M)
         return np.asarray(pairs[seen])
