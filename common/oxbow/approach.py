@@ -22,6 +22,7 @@ from shapely.ops import substring
 
 from oxbow.contracts import FloatArray, FreeSpace, Place, Vehicle
 from oxbow.errors import Infeasible
+from oxbow.reserve import too_short
 from oxbow.route import Landing, RouteMethod, Router, Routes, leg_routes, make_router, way_to
 from oxbow.tolerances import HAIR_M, ON_SHORE_M, ROUNDING_M
 
@@ -79,10 +80,7 @@ class Approach:
             Nothing: the legs alone are longer.
         """
         if self._legs_m >= range_m:
-            raise Infeasible(
-                f"is {range_m:.6g} m; the way to the vehicle's share and home is {self._legs_m:.0f} m",
-                "Master_length",
-            )
+            raise too_short(range_m, self._legs_m, what="the way to the vehicle's share and home")
         return range_m - self._legs_m
 
     def warnings(self, range_m: float) -> tuple[str, ...]:

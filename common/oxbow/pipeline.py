@@ -228,6 +228,7 @@ def _path(
             launch=approach.launch,
             recovery=approach.recovery,
             length_m=length_m,
+            spent_m=member.vehicle.length_m - length_m,
             min_spacing_m=task.mission.minimal_spatial_rate_m or 0.0,
             seed=options.seed,
             weighted_areas=task.site.weighted_areas,

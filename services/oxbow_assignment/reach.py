@@ -11,8 +11,8 @@ from shapely import LineString, Polygon
 
 from oxbow.arrays import Indices, Mask
 from oxbow.contracts import FloatArray, Vehicle
-from oxbow.errors import Infeasible
 from oxbow.mesh import Mesh
+from oxbow.reserve import too_short
 from oxbow.route import leg_routes, lengths_from, way_to
 
 __all__ = ["Reach"]
@@ -132,7 +132,10 @@ class Reach:
         least_m = (self.out_m + self.home_m).min(axis=1)
         for vehicle, own, way_m in zip(vehicles, self.allowed, least_m, strict=True):
             if not own.any():
-                raise Infeasible(
-                    f"is {vehicle.length_m:.6g} m; the way to the nearest water and home is {way_m:.0f} m",
+                raise too_short(
+                    vehicle.length_m,
+                    way_m,
+                    what="the way to the nearest water and home",
+                    reserve=SPARE,
                     where=f"vehicle {vehicle.name!r}: length_m",
                 )

@@ -90,7 +90,7 @@ class Task:
         least_spacing_m = max(request.min_spacing_m, finest_spacing_m(request.space))
         nominal_m = nominal_spacing_m(request.space.free.area, request.length_m, least_spacing_m)
         waters = prepared_waters(request, nominal_m)
-        return cls(request, waters, Budget(request.length_m, least_spacing_m), stop)
+        return cls(request, waters, Budget(request.length_m, least_spacing_m, request.spent_m), stop)
 
     @property
     def spacing_m(self) -> float:

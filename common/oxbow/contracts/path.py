@@ -61,7 +61,8 @@ class PathRequest(Message, frozen=True, kw_only=True):
 
     `weighted_areas` do not overlap, and may reach beyond the water. `time_limit_s` is what may be spent on
     improving the path; without it the work is fixed, and the same request gives the same path everywhere.
-    `smooth` asks for rounded corners. `draw` matters to the space-filling curve alone.
+    `smooth` asks for rounded corners. `draw` matters to the space-filling curve alone. `spent_m` is what the
+    vehicle needs on its way to this path and home from it, beside `length_m`: errors speak of both together.
     """
 
     method: Method = Method.SPACE_FILLING_CURVE
@@ -70,6 +71,7 @@ class PathRequest(Message, frozen=True, kw_only=True):
     launch: Place
     recovery: Place
     length_m: float
+    spent_m: float = 0.0
     min_spacing_m: float = 0.0
     seed: int = 0
     weighted_areas: tuple[WeightedArea, ...] = ()
@@ -80,7 +82,7 @@ class PathRequest(Message, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         require_finite(self, "length_m", above=0.0, most=MOST_LENGTH_M)
         require_finite(self, "time_limit_s", above=0.0, most=MOST_DEADLINE_S)
-        require_finite(self, "min_spacing_m", least=0.0, most=MOST_LENGTH_M)
+        require_finite(self, "spent_m", "min_spacing_m", least=0.0, most=MOST_LENGTH_M)
         x0, y0, x1, y1 = self.space.free.bounds
         extent_m = math.hypot(x1 - x0, y1 - y0)
         if self.min_spacing_m > extent_m:

@@ -106,10 +106,7 @@ def _too_short(task: Task, courses: Sequence[LineString]) -> Infeasible | None:
     if not courses:
         return None
     shortest_m = min(course.length for course in courses)
-    return Infeasible(
-        f"is {task.request.length_m:.6g} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
-        "Master_length",
-    )
+    return task.budget.too_short(shortest_m)
 
 
 def _along(courses: Sequence[LineString], task: Task, display: Display) -> MethodPlan:

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from oxbow.contracts import SpacingStep
-from oxbow.errors import Infeasible
 from oxbow_path.improvement import improved
 from oxbow_path.refinement import NODE_WORK, Guard, Polyline, weights_at
 from oxbow_path.ring.draws import drawn_places
@@ -75,10 +74,7 @@ def _start(task: Task) -> Trial:
         if task.budget.fits(trial.length_m):
             is_starved = trial.length_m < LEAST_START * task.budget.limit_m
             return with_remainder(trial, task.waters, task.budget) if is_starved else trial
-    raise Infeasible(
-        f"is {task.request.length_m:.6g} m; the shortest path from launch to recovery is {trial.length_m:.0f} m",
-        "Master_length",
-    )
+    raise task.budget.too_short(trial.length_m)
 
 
 def _epochs(ring: Polyline, task: Task) -> Iterator[Epoch]:

@@ -13,7 +13,6 @@ from shapely import LineString, Polygon
 
 from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
-from oxbow.errors import Infeasible
 from oxbow.tolerances import ROUNDING_M
 from oxbow_path.task import Task
 from oxbow_path.tour.geodesic import Geodesics, Shore
@@ -153,10 +152,7 @@ def plan_tour(task: Task, *, solver: Solver | None = None) -> TourPlan:
     fitting = [trial for trial in trials if trial.fits(budget)]
     if not fitting:
         shortest_m = min(trial.length_m for trial in trials)
-        raise Infeasible(
-            f"is {task.request.length_m:.6g} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
-            "Master_length",
-        )
+        raise budget.too_short(shortest_m)
     chosen = min(fitting, key=lambda trial: _score(trial, task.waters, budget))
     if not _is_enough(chosen, budget, most):
         longer = replace(chosen, trial=with_remainder(chosen.trial, task.waters, budget))

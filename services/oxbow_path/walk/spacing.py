@@ -7,12 +7,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from oxbow.errors import Infeasible
+from oxbow.reserve import LENGTH_RESERVE, too_short
 from oxbow_path.walk.trial import Pattern, Trial
 
 __all__ = ["Budget", "Fit", "fitted"]
 
-MOST, ENOUGH = 0.999, 0.97
-"""Shares of the longest length that a path may, and should, use."""
+ENOUGH = 0.97
+"""Share of the longest length that a path should use."""
 
 TURNS = 8
 """Trials before the best so far is taken."""
@@ -26,15 +27,19 @@ SENSITIVITY = 1.0
 
 @dataclass(frozen=True)
 class Budget:
-    """The longest path allowed, and how near its legs may come."""
+    """The longest path allowed, and how near its legs may come.
+
+    `spent_m` is what the vehicle needs beside the path, which refusals count in.
+    """
 
     limit_m: float
     least_spacing_m: float = 0.0
+    spent_m: float = 0.0
 
     @property
     def most_m(self) -> float:
-        """How long the path may be: what is left covers the rounding of written positions."""
-        return MOST * self.limit_m
+        """How long the path may be."""
+        return (1.0 - LENGTH_RESERVE) * self.limit_m
 
     @property
     def enough_m(self) -> float:
@@ -43,6 +48,10 @@ class Budget:
 
     def fits(self, length_m: float) -> bool:
         return length_m <= self.most_m
+
+    def too_short(self, shortest_m: float) -> Infeasible:
+        """The refusal where even the shortest path does not fit."""
+        return too_short(self.limit_m + self.spent_m, shortest_m + self.spent_m)
 
     def is_enough(self, trial: Trial) -> bool:
         """No smaller spacing need be tried."""
@@ -101,10 +110,7 @@ def _longest(trials: Sequence[Trial], budget: Budget) -> Trial:
     if fitting:
         return max(fitting, key=lambda trial: trial.length_m)
     shortest_m = min(trial.length_m for trial in trials)
-    raise Infeasible(
-        f"is {budget.limit_m:.6g} m; the shortest path from launch to recovery is {shortest_m:.0f} m",
-        "Master_length",
-    )
+    raise budget.too_short(shortest_m)
 
 
 def _next_spacing(trials: Sequence[Trial], budget: Budget) -> float:
