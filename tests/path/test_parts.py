@@ -17,6 +17,7 @@ from oxbow.errors import Infeasible, Internal
 from oxbow.recording import discard
 from oxbow.reeb import cell_polygon
 from oxbow.route.gate_routes import Routes, taut
+from oxbow.testing import nasty_polygons
 from oxbow_path.conformance import require_conforming
 from oxbow_path.service import handle
 from oxbow_path.task import prepared_waters
@@ -373,6 +374,12 @@ def test_legs_leave_and_come_back_to_islets_that_the_ring_is_led_round(recovery,
     plan = handle(asked, discard)
     assert plan.path.is_simple
     assert not strays(plan.path, asked.space.free, asked.launch, asked.recovery)
+
+
+def test_a_ring_in_narrow_water_that_all_but_touches_itself_is_smoothed_by_less():
+    """Twice as wide as the moat, the first smoothings leave nothing of it."""
+    plan = handle(request(nasty_polygons()["ring"], spacings=8.0), discard)
+    assert plan.path.is_simple
 
 
 def test_a_leg_reaches_a_ring_that_is_farther_away_than_its_entry():

@@ -28,7 +28,7 @@ CUT = 0.25
 START = 0.1
 """Radius of the region that a path without transects grows from, in nominal spacings."""
 
-SMOOTHINGS = 3
+SMOOTHINGS = 8
 """How often a ring that all but touches itself is smoothed, each time by a quarter as much."""
 
 STRAIGHTENING = 0.05
