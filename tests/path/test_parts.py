@@ -175,6 +175,30 @@ def test_the_route_into_an_area_leads_to_the_nearest_place_of_it(seed, size, whe
     assert nearest.length == pytest.approx(shortest.length)
 
 
+@quick
+@given(seed=st.integers(0, 50), size=st.floats(0.001, 0.5), where=st.integers(0, 10_000))
+def test_routes_of_many_into_an_area_are_those_of_each_and_end_on_one_another(seed, size, where):
+    water = lake(seed, roughness=0.5)
+    rng = np.random.default_rng(where)
+    x0, y0, x1, y1 = water.bounds
+    places = rng.uniform((x0, y0), (x1, y1), size=(200, 2))
+    middle, *starts = places[shapely.contains_xy(water, places)][:9]
+    area = Point(middle).buffer(size * (x1 - x0))
+    routes = Routes(water, 40.0)
+    gates = routes.goals_in(area)
+    alone, together = routes.into(area, gates), routes.into(area, gates)
+    built = shapely.MultiPolygon()
+    for start in starts:
+        nearest = routes.to_area(start, area, gates)
+        assert alone.route(start).length == pytest.approx(nearest.length)
+        route = together.route(start, unused_m=0.0)
+        assert route.length <= nearest.length * (1 + 1e-9)
+        assert route.coords[0] == tuple(start)
+        end = Point(route.coords[-1])
+        assert shapely.dwithin(area, end, 1e-6) or shapely.dwithin(built, end, 1e-6) or route.equals(nearest)
+        built = built.union(route.buffer(1e-6))
+
+
 def test_a_taut_route_is_no_longer_and_stays_inside():
     routes = Routes(COMB, 20.0)
     way = LineString(routes.between(np.array([25.0, 700.0]), np.array([925.0, 700.0])))

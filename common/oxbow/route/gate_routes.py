@@ -21,9 +21,9 @@ from oxbow.contracts import FloatArray
 from oxbow.errors import Internal
 from oxbow.route.channel import Gates
 from oxbow.route.mesh import Mesh
-from oxbow.route.search import cheapest_ways
+from oxbow.route.search import WaysTo, cheapest_ways, cheapest_ways_to
 
-__all__ = ["Routes", "taut"]
+__all__ = ["Inward", "Routes", "taut"]
 
 TAUT_POINTS = 200
 """Into how many steps a route is divided before it is pulled tight."""
@@ -72,6 +72,14 @@ class Routes:
         near = np.sort(self._middles.query(line, predicate="dwithin", distance=distance_m))
         return np.asarray(near[self._gates.mesh.twins[near] >= 0])
 
+    def into(self, area: BaseGeometry, goals: Indices) -> Inward:
+        """The shortest routes from everywhere into an area, for many at once; else as `to_area`."""
+        end = None
+        if len(goals) == 0:
+            end = shapely.get_coordinates(area.representative_point())[0]
+            goals = self._gates.mesh.twins[self._gates_out_of(self._triangle_at(end))]
+        return Inward(self, cheapest_ways_to(self._graph, goals), end)
+
     def to_area(self, start: FloatArray, area: BaseGeometry, goals: Indices) -> LineString | None:
         """The shortest route from a point of the water into an area; None if none leads there.
 
@@ -112,6 +120,53 @@ class Routes:
         if not np.isfinite(length_m[rank, last]):
             return None
         return np.asarray(places[ways.way(int(rank), int(goals[last]))])
+
+
+class Inward:
+    """Routes from many places into one area, of which each ends where it comes upon one before it.
+
+    Parameters
+    ----------
+    routes
+        The water's routes.
+    ways
+        From each gate to the area.
+    end
+        Where to go from the last gate, into an area too small to hold any.
+    """
+
+    def __init__(self, routes: Routes, ways: WaysTo, end: FloatArray | None) -> None:
+        self._routes = routes
+        self._ways = ways
+        self._end = end
+        self._passed = np.zeros(len(ways.costs), dtype=bool)
+
+    def route(self, start: FloatArray, unused_m: float = math.inf) -> LineString | None:
+        """The route from a place; None if none leads there.
+
+        Parameters
+        ----------
+        start
+            A place of the water.
+        unused_m
+            How much of its beginning no later route may end on; by default, none ends on it at all.
+        """
+        places = self._routes._gates.places
+        triangle = self._routes._triangle_at(start)
+        if self._end is not None and triangle == self._routes._triangle_at(self._end):
+            return LineString([start, self._end])
+        first = self._routes._gates_out_of(triangle)
+        length_m = np.hypot(*(places[first] - start).T) + self._ways.costs[first]
+        if not np.isfinite(length_m).any():
+            return None
+        gates = np.array(self._ways.way(int(first[np.argmin(length_m)])))
+        met = np.flatnonzero(self._passed[gates])
+        points = np.vstack([start, places[gates[: met[0] + 1] if len(met) else gates]])
+        along_m = np.cumsum(np.hypot(*np.diff(points, axis=0).T))
+        self._passed[gates[: len(along_m)][along_m > unused_m]] = True
+        if self._end is not None and not len(met):
+            points = np.vstack([points, self._end])
+        return LineString(points)
 
 
 def taut(route: LineString, water: BaseGeometry) -> LineString:

@@ -13,7 +13,7 @@ from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow.route.danger import Danger
 
-__all__ = ["Arcs", "Ways", "cheapest_ways", "distinct"]
+__all__ = ["Arcs", "Ways", "WaysTo", "cheapest_ways", "cheapest_ways_to", "distinct"]
 
 
 @dataclass(frozen=True)
@@ -69,6 +69,27 @@ def cheapest_ways(graph: csr_array[np.float64], sources: Indices) -> Ways:
     """Search a graph (`Arcs.graph`) from some of its places."""
     costs, previous = dijkstra(graph, indices=sources, return_predecessors=True)
     return Ways(costs, previous.astype(np.intp))
+
+
+@dataclass(frozen=True)
+class WaysTo:
+    """The cheapest ways from all places to the nearest of some goals: costs (inf where none leads), next steps."""
+
+    costs: FloatArray
+    following: Indices
+
+    def way(self, place: int) -> list[int]:
+        """The places on the way from a place to its goal; both included."""
+        way = [place]
+        while (place := int(self.following[place])) >= 0:
+            way.append(place)
+        return way
+
+
+def cheapest_ways_to(graph: csr_array[np.float64], goals: Indices) -> WaysTo:
+    """Search a graph (`Arcs.graph`) backwards, from some of its places to all: once, however many set out."""
+    costs, following, _ = dijkstra(graph.T.tocsr(), indices=goals, min_only=True, return_predecessors=True)
+    return WaysTo(costs, following.astype(np.intp))
 
 
 def distinct(tails: Indices, heads: Indices) -> tuple[Indices, Indices]:

@@ -7,6 +7,7 @@ where a narrow strip of water is crossed by the path once, the path may go round
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -15,6 +16,7 @@ from shapely import LineString, Point, Polygon
 
 from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
+from oxbow.route.gate_routes import Inward
 from oxbow.tolerances import ROUNDING_M
 from oxbow_path.walk.region import largest
 from oxbow_path.walk.stretch import stretch
@@ -59,11 +61,12 @@ def with_detours(path: LineString, waters: Waters, most_m: float, *, reach_m: fl
     """
     for _ in range(ROUNDS):
         before_m = path.length
+        ways = _Ways(path, waters)
         for gap in _gaps(path, waters, most_m - before_m, reach_m):
             left_m = most_m - path.length
             if left_m < LEAST_SHARE * waters.spacing_m:
                 return path
-            path = detoured(path, waters, gap, left_m) or path
+            path = _detoured(path, ways, gap, left_m) or path
         if path.length - before_m < LEAST_SHARE * waters.spacing_m:
             break
     return path
@@ -93,11 +96,29 @@ def _spread(points: FloatArray, distance_m: FloatArray, apart_m: float) -> Indic
     return np.array(chosen, dtype=np.intp)
 
 
-def detoured(
-    path: LineString, waters: Waters, gap: FloatArray, left_m: float, *, short_of: float = SHORT_OF
+class _Ways:
+    """Ways to a path, which are searched when the first is asked for, and hold for what it is led round to."""
+
+    def __init__(self, path: LineString, waters: Waters) -> None:
+        self._path = path
+        self.waters = waters
+
+    @cached_property
+    def inward(self) -> Inward:
+        routes = self.waters.routes
+        return routes.into(self._path, routes.goals_near(self._path, HALF_WIDTH * self.waters.spacing_m))
+
+
+def detoured(path: LineString, waters: Waters, gap: FloatArray, left_m: float) -> LineString | None:
+    """The path with one detour all the way to a place, no longer by more than `left_m`; None where none fits."""
+    return _detoured(path, _Ways(path, waters), gap, left_m, short_of=0.0)
+
+
+def _detoured(
+    path: LineString, ways: _Ways, gap: FloatArray, left_m: float, *, short_of: float = SHORT_OF
 ) -> LineString | None:
-    """The path with one detour towards a place, no longer by more than `left_m`; None where none fits."""
-    out = _way_out(path, waters, gap)
+    waters = ways.waters
+    out = _way_out(path, ways, gap)
     half_width_m = HALF_WIDTH * waters.spacing_m
     for _ in range(NARROWINGS):
         length_m = min(out.length - short_of * waters.spacing_m, (left_m - 2 * half_width_m) / 2)
@@ -109,13 +130,13 @@ def detoured(
     return None
 
 
-def _way_out(path: LineString, waters: Waters, gap: FloatArray) -> LineString:
+def _way_out(path: LineString, ways: _Ways, gap: FloatArray) -> LineString:
     """From the path to a place: straight where the water allows it, else along the middle of the water."""
+    waters = ways.waters
     straight = LineString(shapely.get_coordinates(shapely.shortest_line(path, Point(gap))))
     if shapely.covers(waters.passable.free_and_rounding, straight):
         return straight
-    goals = waters.routes.goals_near(path, HALF_WIDTH * waters.spacing_m)
-    way = waters.routes.to_area(gap, path, goals)
+    way = ways.inward.route(gap)
     if way is None:
         return straight
     met = shapely.get_coordinates(way.intersection(path))

@@ -170,9 +170,7 @@ def _from_home(loop: LineString, task: Task) -> LineString | None:
     if not shapely.covers(waters.passable.free_and_rounding, sight):
         away = loop.project(home) + loop.length / 2
         turned = _turned(loop, away % loop.length)
-        found = detoured(
-            turned, waters, shapely.get_coordinates(home)[0], task.budget.most_m - loop.length, short_of=0.0
-        )
+        found = detoured(turned, waters, shapely.get_coordinates(home)[0], task.budget.most_m - loop.length)
         if found is None:
             return None
         loop = found

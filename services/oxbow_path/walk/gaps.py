@@ -12,8 +12,7 @@ from shapely.ops import substring
 
 from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
-from oxbow.route.gate_routes import Routes
-from oxbow.tolerances import ROUNDING_M
+from oxbow.route.gate_routes import Inward, Routes
 from oxbow_path.walk.probe import Probe
 from oxbow_path.walk.region import Brush, Walk, largest, simply_connected
 
@@ -64,14 +63,15 @@ def _branches(
 ) -> Iterator[LineString]:
     """A branch for each gap that no earlier branch of this round has come near, to the region or such a branch."""
     reached = np.zeros(len(gaps), dtype=bool)
-    goals = routes.goals_in(region)
+    inward: Inward | None = None
     for number, gap in enumerate(gaps):
         if reached[number]:
             continue
-        branch = branch_to(gap, region, routes, goals, brush.half_width_m)
-        kept = _shortened(branch, min(brush.margin_m, branch.length / 2))
-        yield kept
-        goals = np.union1d(goals, routes.goals_near(kept, ROUNDING_M))
+        branch = _straight(gap, region, routes, brush.half_width_m)
+        if branch is None:
+            inward = inward or routes.into(region, routes.goals_in(region))
+            branch = inward.route(gap, brush.margin_m) or shapely.shortest_line(Point(gap), region)
+        yield _shortened(branch, min(brush.margin_m, branch.length / 2))
         steps = shapely.get_coordinates(shapely.segmentize(branch, apart_m / 4)) if branch.length else gap[None]
         # A long branch in fine samples has far more pairs of a step and a gap than either.
         left = np.flatnonzero(~reached)
@@ -82,11 +82,16 @@ def _branches(
 
 def branch_to(gap: FloatArray, region: Polygon, routes: Routes, goals: Indices, overlap_m: float) -> LineString:
     """From a gap straight to the region where the water allows, else along the middle of the water."""
+    straight = _straight(gap, region, routes, overlap_m)
+    if straight is not None:
+        return straight
+    return routes.to_area(gap, region, goals) or shapely.shortest_line(Point(gap), region)
+
+
+def _straight(gap: FloatArray, region: Polygon, routes: Routes, overlap_m: float) -> LineString | None:
+    """Straight to the region and into it; None where the water does not allow that."""
     straight = shapely.shortest_line(Point(gap), region)
-    if shapely.covers(routes.water, straight):
-        return _lengthened(straight, overlap_m)
-    route = routes.to_area(gap, region, goals)
-    return straight if route is None else route
+    return _lengthened(straight, overlap_m) if shapely.covers(routes.water, straight) else None
 
 
 def _shortened(line: LineString, by_m: float) -> LineString:
