@@ -1,4 +1,4 @@
-"""Reassign what is left, when a vehicle is lost or a target is new, without sending vehicles hither and thither.
+"""Reassign what is left, when a vehicle is lost or a target is new, without sending vehicles to and fro.
 
 The Hungarian method alone may turn a vehicle round before it has visited anything (Innocenti, Pollini and
 Bracci 2006, section 4.2). Here a vehicle keeps its current target, the first of its tour, unless giving it up

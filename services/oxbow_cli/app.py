@@ -155,6 +155,12 @@ def plan(
         report.print_plan(planned, completed.path)
 
 
+def _planners() -> int:
+    import os
+
+    return max(2, os.cpu_count() or 1)
+
+
 @app.command()
 def up(
     listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where the router listens.")] = DEFAULT_ENDPOINT,
@@ -165,10 +171,11 @@ def up(
 ) -> None:
     """Start a router and the services, and keep them running until Ctrl-C or SIGTERM.
 
-    A process that dies is started again. Plan on the stack with `oxbow plan --connect`, or with
-    `oxbow.Client` from Python.
+    There is one process of each stage, and of the path stage one per processor, two at least: a mission that takes
+    long does not hold up all others. A process that dies is started again. Plan on the stack with
+    `oxbow plan --connect`, or with `oxbow.Client` from Python.
 
-    Example: `oxbow up --listen tcp/127.0.0.1:7447 --replicas path=2`
+    Example: `oxbow up --listen tcp/127.0.0.1:7447 --replicas path=4`
     """
     import logging
 
@@ -183,7 +190,7 @@ def up(
         endpoint=endpoint(listen, "--listen"),
         home=home_folder(home),
         recordings=recordings_folder(home),
-        replicas=replica_counts(replicas or ()),
+        replicas={"path": _planners()} | replica_counts(replicas or ()),
     )
     with writing(settings.home):
         settings.home.mkdir(parents=True, exist_ok=True)

@@ -20,8 +20,23 @@ LEAST_SHARE = 0.1
 """Smaller parts than this share of a square of side `reach_m` are not worth a line, unless they are as long."""
 
 
-def dropped_parts(path: LineString, free: Polygon, reach_m: float) -> tuple[DroppedPart, ...]:
-    """The parts of the free space farther than `reach_m` from the path, the largest first."""
+SPENT, UNREACHED = "going there is not worth its length", "no way there that was tried is better"
+"""Why water is left: of a path that uses its length, and of one that does not."""
+
+
+def dropped_parts(path: LineString, free: Polygon, reach_m: float, *, is_spent: bool) -> tuple[DroppedPart, ...]:
+    """The parts of the free space farther than `reach_m` from the path, the largest first.
+
+    Parameters
+    ----------
+    path, free
+        Of one plan.
+    reach_m
+        What is nearer counts as seen.
+    is_spent
+        Whether the path uses the length that there is: what is left away says why.
+    """
+    why = SPENT if is_spent else UNREACHED
     coarse = path.simplify(DETAIL * reach_m)
     rest = shapely.get_parts(free.difference(coarse.buffer(reach_m, quad_segs=QUAD_SEGS)))
     is_arm = shapely.minimum_bounding_radius(rest) > reach_m / 2
@@ -29,7 +44,7 @@ def dropped_parts(path: LineString, free: Polygon, reach_m: float) -> tuple[Drop
     return tuple(
         DroppedPart(
             area_m2=float(part.area),
-            reason=f"farther than {reach_m:.0f} m from the path: going there is not worth its length",
+            reason=f"farther than {reach_m:.1f} m from the path: {why}",
             place=(float(place.x), float(place.y)),
             outline=part,
         )

@@ -56,7 +56,12 @@ def planned(request: PathRequest, stop: Stop, show: Show) -> PathPlan:
         path=path,
         spacing_m=claimed_m,
         steps=plan.steps,
-        dropped=dropped_parts(path, request.space.free, plan.reach_m * claimed_m / plan.spacing_m),
+        dropped=dropped_parts(
+            path,
+            request.space.free,
+            plan.reach_m * claimed_m / plan.spacing_m,
+            is_spent=path.length >= ACCEPTED * request.length_m,
+        ),
         warnings=tuple(_length_warnings(plan, task)),
     )
 
@@ -88,7 +93,8 @@ def _length_warnings(plan: MethodPlan, task: Task) -> Iterator[str]:
         if plan.spacing_m <= request.min_spacing_m:
             reason = f"Minimal_spatial_rate keeps the spacing at {request.min_spacing_m:g} m"
         elif min(plan.spacing_m, task.spacing_m) <= finest_spacing_m(request.space):
-            reason = f"the water is small, and no spacing below {finest_spacing_m(request.space):.2g} m is planned"
+            finest_m = finest_spacing_m(request.space)
+            reason = f"no spacing below {finest_m:.2g} m is planned in water of this size and shore"
         elif task.stop():
             reason = f"its improvement ended after {request.time_limit_s:g} s"
         else:

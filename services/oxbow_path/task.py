@@ -45,7 +45,7 @@ SAMPLE_PITCH = 0.215
 """Pitch of the samples, in nominal spacings: 25 a square of one spacing."""
 
 SHOWN_EVERY = 10
-"""The path of every so manieth step of an improvement is shown."""
+"""Of the steps of an improvement, one in so many is shown with its path."""
 
 FINEST_M = 0.1
 """No less spacing is planned, however small the water: vehicles are not narrower."""

@@ -136,7 +136,7 @@ def test_a_length_that_small_water_cannot_use_is_told(monkeypatch):
     plan = handle(asked, discard)
     require_sound(plan, asked)
     assert plan.spacing_m == pytest.approx(np.sqrt(asked.space.free.area) / 25)
-    assert any("the water is small" in warning for warning in plan.warnings)
+    assert any("no spacing below" in warning for warning in plan.warnings)
 
 
 def test_a_launch_point_ashore_is_reached_straight_over_land():

@@ -39,6 +39,9 @@ EVENNESS_QUANTILE = 0.95
 GOOD = 1.6
 """A plan whose `_score_m` is no more spacings than this is taken at once: the other would hardly do better."""
 
+MANY = 30_000
+"""A plan of more waypoints than this is taken at once: to refine another as long would take a minute."""
+
 NARROW = 2.65
 """In water of no more mean width than this, in spacings, no method's pattern has room: courses are tried first."""
 
@@ -62,9 +65,13 @@ def best_plan(method: PathMethod, task: Task, display: Display) -> MethodPlan:
         except Infeasible as refusal:
             if not fitting:
                 plans.append(_at_least(task, display, courses, refusal))
-        if plans and (task.stop() or _score_m(plans[-1].path, task) <= GOOD * task.spacing_m):
+        if plans and (task.stop() or _is_good(plans[-1].path, task)):
             break
     return _reaching(min(plans, key=lambda plan: _score_m(plan.path, task)), task)
+
+
+def _is_good(path: LineString, task: Task) -> bool:
+    return len(path.coords) > MANY or _score_m(path, task) <= GOOD * task.spacing_m
 
 
 def _reaching(plan: MethodPlan, task: Task) -> MethodPlan:
