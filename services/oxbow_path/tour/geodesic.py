@@ -11,20 +11,21 @@ the least tree over all, which one search over this graph finds.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
 from scipy.sparse import coo_array, csr_array, vstack
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
-from shapely import Polygon
+from shapely import MultiPoint, Polygon
 
 from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow.route.mesh import Mesh, Touches
 from oxbow.triangles import following
+from oxbow_path.tour.sight import Sight
 
 __all__ = ["Geodesics", "Shore"]
 
@@ -40,8 +41,11 @@ TOUCH_M = 1e-6
 LEAST_STEP_M = 1e-9
 """A sparse matrix drops zeros."""
 
-WIDER = (1.5, 6.0)
-"""A search for a way goes so many times as far as the straight line, before it goes everywhere."""
+FIRST_REACH = 1.5
+"""A search for a way goes so many times as far as the straight line, then twice as far each time it fails."""
+
+DOUBLINGS = 7
+"""After so many a search goes everywhere."""
 
 TOGETHER = 64
 """So many ways are searched for at once: each search copies the graph."""
@@ -60,9 +64,10 @@ class Shore:
         shapely.prepare(free)
         self.free = free
         self._mesh = Mesh.of(free)
+        self._sight = Sight(free)
         self._corners, sectors = self._mesh.sector_places, self._mesh.sectors
         places, place, count = np.unique(self._corners, axis=0, return_inverse=True, return_counts=True)
-        self._touches = shapely.multipoints(places[count > 1])
+        self._touches = MultiPoint(places[count > 1])
         self._plain = np.flatnonzero(count[place] == 1)
         plain = self._corners[self._plain]
         near = self._plain[_nearest(plain, plain, CORNERS_IN_SIGHT)]
@@ -82,8 +87,10 @@ class Shore:
     def _in_sight(self, places: FloatArray, pairs: Indices) -> Indices:
         """Those pairs of places between which a straight line stays in the water, and passes no touch."""
         pairs = np.unique(np.sort(pairs, axis=1), axis=0)
-        lines = shapely.linestrings(places[pairs])
-        seen = shapely.covers(self.free, lines) & ~shapely.dwithin(lines, self._touches, TOUCH_M)
+        lines = np.asarray(shapely.linestrings(places[pairs]))
+        seen = self._sight.along(places, pairs, lines)
+        if not self._touches.is_empty:
+            seen &= ~shapely.dwithin(lines, self._touches, TOUCH_M)
         return np.asarray(pairs[seen])
 
 
@@ -97,6 +104,7 @@ class Geodesics:
     count: int
     places: FloatArray
     graph: csr_array[np.float64]
+    _known: dict[tuple[int, int], _Leg] = field(default_factory=dict, repr=False, compare=False)
 
     def near(self, limit_m: float) -> csr_array[np.float64]:
         """Distances of all pairs of sites no farther apart than the limit, shape (n, n)."""
@@ -147,27 +155,29 @@ class Geodesics:
         return self.places[np.concatenate(parts).astype(np.intp)]
 
     def _legs(self, starts: Indices, goals: Indices) -> list[_Leg]:
-        """The shortest ways of pairs of sites: those about as far apart are searched for together."""
-        apart_m = np.hypot(*(self.places[goals] - self.places[starts]).T) + LEAST_STEP_M
-        legs: dict[int, _Leg] = {}
+        """The shortest ways of pairs of sites, each searched for once: a tour keeps legs of its start."""
+        pairs = list(zip(starts.tolist(), goals.tolist(), strict=True))
+        fresh = np.array(sorted({pair for pair in pairs if pair not in self._known}), dtype=np.intp).reshape(-1, 2)
+        apart_m = np.hypot(*(self.places[fresh[:, 1]] - self.places[fresh[:, 0]]).T) + LEAST_STEP_M
         nearest_first = np.argsort(apart_m, kind="stable")
-        for first in range(0, len(starts), TOGETHER):
-            left = nearest_first[first : first + TOGETHER]
-            for wider in (*WIDER, np.inf):
-                distance, previous = dijkstra(
-                    self.graph,
-                    indices=starts[left],
-                    return_predecessors=True,
-                    limit=wider * float(apart_m[left].max()),
-                )
-                reached = np.isfinite(distance[np.arange(len(left)), goals[left]])
-                for row in np.flatnonzero(reached).tolist():
-                    pair = int(left[row])
-                    legs[pair] = _Leg.of(distance[row], previous[row], int(starts[pair]), int(goals[pair]))
-                left = left[~reached]
-                if len(left) == 0:
-                    break
-        return [legs[pair] for pair in range(len(starts))]
+        for first in range(0, len(fresh), TOGETHER):
+            chosen = nearest_first[first : first + TOGETHER]
+            for leg in self._search(fresh[chosen], FIRST_REACH * float(apart_m[chosen].max())):
+                start, goal = leg.nodes[0], leg.nodes[-1]
+                self._known[start, goal], self._known[goal, start] = leg, leg.back()
+        return [self._known[pair] for pair in pairs]
+
+    def _search(self, pairs: Indices, reach_m: float) -> Iterator[_Leg]:
+        """The shortest ways of pairs, shape (n, 2), searched for together, at first within a distance."""
+        for limit_m in (*(reach_m * 2.0**doubling for doubling in range(DOUBLINGS + 1)), np.inf):
+            starts, goals = pairs.T
+            distance, previous = dijkstra(self.graph, indices=starts, return_predecessors=True, limit=limit_m)
+            reached = np.isfinite(distance[np.arange(len(pairs)), goals])
+            for row in np.flatnonzero(reached).tolist():
+                yield _Leg.of(distance[row], previous[row], int(starts[row]), int(goals[row]))
+            pairs = pairs[~reached]
+            if len(pairs) == 0:
+                break
 
 
 @dataclass(frozen=True)
@@ -183,6 +193,10 @@ class _Leg:
         while nodes[-1] != start:
             nodes.append(int(previous[nodes[-1]]))
         return cls(float(distance_m[goal]), tuple(nodes[::-1]))
+
+    def back(self) -> _Leg:
+        """The same way from its goal to its start."""
+        return _Leg(self.length_m, self.nodes[::-1])
 
 
 def _nearest(points: FloatArray, others: FloatArray, count: int) -> Indices:
