@@ -13,6 +13,8 @@ from shapely import Polygon, affinity, box
 
 from oxbow.errors import InvalidMission
 from oxbow.mesh import Mesh, mesh_area, propagate
+from oxbow.mesh.refinement import refined
+from oxbow.mesh.triangulation import Triangulation
 from oxbow.testing import nasty_polygons
 
 quick = settings(deadline=None, max_examples=6, derandomize=True)
@@ -194,3 +196,19 @@ def test_wavefronts_stay_within_what_they_may_enter():
     waves = propagate(mesh, [start, start], left)
     assert (waves.depth[~left] == -1).all()
     assert (waves.source[left] == 0).all()
+
+
+@pytest.mark.parametrize("seed", [238, *range(10)])
+def test_sides_of_one_length_lead_to_an_end(seed):
+    """Rounding makes each of an equilateral lattice's sides the longest for one of its triangles."""
+    rng = np.random.default_rng(seed)
+    turn, away = rng.uniform(0, 1), rng.uniform(-1, 1, 2)
+    steps = np.array([[np.cos(angle), np.sin(angle)] for angle in (turn, turn + np.pi / 3)])
+    places = np.array([(i, j) for i in range(-3, 4) for j in range(-3, 4) if abs(i + j) <= 3])
+    is_inner = np.maximum(np.abs(places).max(axis=1), np.abs(places.sum(axis=1))) < 3
+    lattice = 10 * places @ steps + away
+    corners = turn + np.arange(6) * np.pi / 3
+    hexagon = Polygon(30 * np.column_stack([np.cos(corners), np.sin(corners)]) + away)
+    mesh = Triangulation.of(shapely.segmentize(hexagon, 10.0000001)).with_points(lattice[is_inner])
+    finer = refined(mesh, 6.0, 0.0)
+    assert finer.side_lengths.max() <= 6.0 * (1 + 1e-9)

@@ -39,9 +39,15 @@ def refined(mesh: Triangulation, edge_m: float, least_angle_rad: float) -> Trian
 def _terminal_sides(mesh: Triangulation) -> Indices:
     """For every triangle, where its path over longest sides ends; of a side's two numbers, the lower one.
 
-    Pointer jumping: in each round, every triangle looks twice as far.
+    Pointer jumping: in each round, every triangle looks twice as far. Sides have an order that both their
+    triangles agree upon, equal ones too: a path that came back to its start would have no end.
     """
-    sides = np.arange(0, 3 * len(mesh.triangles), 3) + np.argmax(mesh.side_lengths, axis=1)
+    numbers = np.arange(3 * len(mesh.triangles))
+    edges = np.where(mesh.twins < 0, numbers, np.minimum(numbers, mesh.twins))
+    order = np.lexsort((edges, mesh.side_lengths.ravel()[edges]))
+    rank = np.empty_like(order)
+    rank[order] = numbers
+    sides = 3 * np.arange(len(mesh.triangles)) + np.argmax(rank[edges].reshape(-1, 3), axis=1)
     twins = mesh.twins[sides]
     beyond = twins // 3
     mutual = (twins < 0) | (sides[np.where(twins < 0, 0, beyond)] == twins)
