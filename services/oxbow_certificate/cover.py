@@ -11,6 +11,7 @@ import shapely
 from shapely import MultiPolygon
 
 from oxbow.contracts import FloatArray, Place
+from oxbow.tolerances import ROUNDING_M
 from oxbow_certificate.distance import PathDistance
 from oxbow_certificate.quadtree import Squares
 
@@ -36,6 +37,13 @@ class Farthest(NamedTuple):
     distance_m: float
 
 
+class FarthestCentres(NamedTuple):
+    """Places (n, 2), the farthest first, and its distance to the path."""
+
+    places: FloatArray
+    distance_m: float
+
+
 def least_radius(area_m2: float, length_m: float, paths: int = 1) -> float:
     """Least cover radius that paths of a given length in all could reach over a given area, in metres.
 
@@ -53,7 +61,8 @@ def cover_radius(
 
     Distance changes by no more than the way gone (it is 1-Lipschitz), so that over a square it is at most that of
     the centre plus half the diagonal. Squares whose bound is not above what some place of the region attains are
-    dropped, the others quartered: the method of Shubert (1972) on a quadtree in place of an interval.
+    dropped, the others quartered: the method of Shubert (1972) on a quadtree in place of an interval. Most are
+    dropped by the distance to the path's vertices, before that to its segments is asked for.
 
     Parameters
     ----------
@@ -69,24 +78,36 @@ def cover_radius(
     """
     shapely.prepare(region)
     place, low_m = _farthest(shapely.get_coordinates(region), distance)
+    bounds = distance.bounds(low_m / 2)
     squares = Squares.around(region)
     examined = 0
     while True:
-        centre_m = distance(squares.centres)
         examined += len(squares)
-        hopeful = squares.centres[np.argsort(-centre_m, kind="stable")[:_HOPEFUL]]
+        bound_m = bounds(squares.centres)
+        hopeful, hopeful_m = _farthest_centres(squares.centres, bound_m, distance)
         candidate, candidate_m = _farthest(_nearest_places(region, hopeful), distance)
         if candidate_m > low_m:
             place, low_m = candidate, candidate_m
-        upper_m = centre_m + squares.circumradius_m
-        alive = upper_m > low_m * (1 + gap)
-        high_m = max(low_m * (1 + gap), float(upper_m.max()))
-        squares = squares.where(alive).meeting(region)
+        high_m = max(low_m * (1 + gap), hopeful_m + squares.circumradius_m)
+        may_be_alive = bound_m + squares.circumradius_m > low_m * (1 + gap) - ROUNDING_M
+        squares = squares.where(may_be_alive).meeting(region)
+        alive = distance(squares.centres) + squares.circumradius_m > low_m * (1 + gap)
+        squares = squares.where(alive)
         if not len(squares):
             return CoverRadius(low_m, low_m * (1 + gap), place)
         if examined + 4 * len(squares) > most_squares:
             return CoverRadius(low_m, high_m, place)
         squares = squares.quarters()
+
+
+def _farthest_centres(centres: FloatArray, bound_m: FloatArray, distance: PathDistance) -> FarthestCentres:
+    """The centres farthest from the path, and how far the first is; of all there are upper bounds."""
+    likely = np.argsort(-bound_m)[: 4 * _HOPEFUL]
+    least_m = np.sort(distance(centres[likely]))[-_HOPEFUL:][0]
+    centres = centres[bound_m >= least_m - ROUNDING_M]
+    centre_m = distance(centres)
+    chosen = np.argsort(-centre_m, kind="stable")[:_HOPEFUL]
+    return FarthestCentres(centres[chosen], float(centre_m[chosen[0]]))
 
 
 def _farthest(places: FloatArray, distance: PathDistance) -> Farthest:

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import shapely
+from scipy.spatial import cKDTree
 from shapely import STRtree
 
 from oxbow.contracts import FloatArray
 from oxbow_certificate.axes import Paths, main_direction, segment_ends, turned
 
-__all__ = ["PathDistance", "segments_of"]
+__all__ = ["DistanceBounds", "PathDistance", "segments_of"]
 
 
 def segments_of(paths: Paths) -> npt.NDArray[Any]:
@@ -22,6 +23,9 @@ def segments_of(paths: Paths) -> npt.NDArray[Any]:
 
 _PIECES = 2_000
 """A path is cut into some so many pieces at least: the box of a long oblique segment is mostly empty."""
+
+_MOST_PLACES = 200_000
+"""Upper bounds are taken by about so many places of a path at most."""
 
 
 class PathDistance:
@@ -33,6 +37,7 @@ class PathDistance:
     def __init__(self, paths: Paths) -> None:
         self._along = main_direction(paths)
         upright = shapely.transform(paths, lambda xy: turned(xy, self._along))
+        self._paths = paths
         self._tree = STRtree(segments_of(upright.segmentize(paths.length / _PIECES)))
 
     def __call__(self, places: FloatArray) -> FloatArray:
@@ -40,3 +45,18 @@ class PathDistance:
         points = shapely.points(turned(places, self._along))
         _, distances = self._tree.query_nearest(points, return_distance=True, all_matches=False)
         return np.asarray(distances)
+
+    def bounds(self, detail_m: float) -> DistanceBounds:
+        """Upper bounds of the distance, by places of the paths about so many metres apart."""
+        return DistanceBounds(self._paths.segmentize(max(detail_m, self._paths.length / _MOST_PLACES)))
+
+
+class DistanceBounds:
+    """Upper bounds of the distance from places to paths: those to the nearest vertex, which is soon found."""
+
+    def __init__(self, paths: Paths) -> None:
+        self._tree = cKDTree(shapely.get_coordinates(paths))
+
+    def __call__(self, places: FloatArray) -> FloatArray:
+        """Bounds (n,) in metres for `places` (n, 2)."""
+        return np.asarray(self._tree.query(places)[0])
