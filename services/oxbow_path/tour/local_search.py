@@ -32,6 +32,12 @@ KICKS = 5
 
 MOST_KICKS = 10_000
 
+ROUND = 1000
+"""So many kicks are tried before what they gain is looked at."""
+
+LEAST_ROUND = 5e-4
+"""A round of kicks that shortens a tour by a smaller part is the last."""
+
 WALK = 3
 """The legs of a kick start so many steps, from near site to near site, from one another."""
 
@@ -51,8 +57,11 @@ def shortened(start: Start, *, seed: int) -> Solution:
     count = len(start.order)
     if count >= LEAST_SITES:
         rng = np.random.default_rng(seed)
-        for chances in rng.random((min(KICKS * count, MOST_KICKS), 1 + 2 * WALK)).tolist():
-            search.kick(chances)
+        kicks = rng.random((min(KICKS * count, MOST_KICKS), 1 + 2 * WALK))
+        for first in range(0, len(kicks), ROUND):
+            gained_m = sum(search.kick(chances) for chances in kicks[first : first + ROUND].tolist())
+            if gained_m < LEAST_ROUND * start.length_m(search.order):
+                break
     return Solution(search.order, "2-opt and Or-opt")
 
 
@@ -94,8 +103,8 @@ class _Search:
                 waiting.update(fresh)
         return gained_m
 
-    def kick(self, chances: Sequence[float]) -> None:
-        """A double bridge at three legs that random walks choose, undone unless the tour becomes no longer."""
+    def kick(self, chances: Sequence[float]) -> float:
+        """A double bridge at three legs that random walks choose, undone if it makes the tour longer; the gain."""
         first = int(chances[0] * self._count)
         walks = (self._walk(first, chances[1 : 1 + WALK]), self._walk(first, chances[1 + WALK :]))
         i, j, k = sorted(self._at[site] for site in (first, *walks))
@@ -103,13 +112,16 @@ class _Search:
         a, a1, b, b1, c, c1 = ends
         to = self._to
         if j in (i, k) or not (b1 in to[a] and c1 in to[b] and a1 in to[c]):
-            return
+            return 0.0
         before = self.order.copy()
         gained_m = to[a][a1] + to[b][b1] + to[c][c1] - to[a][b1] - to[b][c1] - to[c][a1]
         self._exchange(i + 1, j + 1, k + 1)
-        if gained_m + self.descend(ends) < 0.0:
-            self.order[:] = before
-            self._place[before] = np.arange(self._count)
+        gained_m += self.descend(ends)
+        if gained_m >= 0.0:
+            return gained_m
+        self.order[:] = before
+        self._place[before] = np.arange(self._count)
+        return 0.0
 
     def _walk(self, site: int, chances: Sequence[float]) -> int:
         for chance in chances:
