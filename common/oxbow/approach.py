@@ -38,6 +38,8 @@ NEAR_GATES = 10.0
 """Gates of the way out and home that are no farther apart than so many times their legs become one."""
 OFF_M = 1e-2
 """A leg that strays so little from the water stays in it: what the certificate takes for the shore."""
+OPENING = 0.1
+"""The ways out and home open by this share of the way to the free space."""
 FAR = 0.25
 """Legs that take more than this share of a range are told: they are missing where the vehicle surveys."""
 SPARE = 1.001
@@ -141,15 +143,24 @@ class Approach:
 
 @dataclass(frozen=True)
 class MiddleLine:
-    """The middle line (n, 2) of a leg, from a place to a gate; from ashore its second point is the berth."""
+    """The middle line (n, 2) of a leg, from a place to a gate; from ashore its second point is the berth.
+
+    `entry` is the number of the point where the line comes to the free space.
+    """
 
     points: FloatArray
     is_ashore: bool
+    entry: int = 0
 
     def beside(self, apart_m: float) -> FloatArray:
-        """The leg to the right of its middle line, without the gate: over land by a hair, then by a distance."""
+        """The leg to the right of its middle line, without the gate.
+
+        Over land it is moved by a hair, from there to the free space by ever more, and then by a distance: were it
+        by the distance at once, the leg from a place on an open shore would run along that shore.
+        """
         first = 1 if self.is_ashore else 0
-        afloat = _beside(self.points[first:-1], apart_m)[1:]
+        narrow = _ever_more_beside(self.points[first : self.entry + 1], apart_m)
+        afloat = np.vstack([narrow, _beside(self.points[max(first, self.entry) : -1], apart_m)[1:]])
         if not self.is_ashore:
             return np.vstack([self.points[:1], afloat])
         place, berth = self.points[:2]
@@ -229,7 +240,9 @@ class Harbour:
         )
 
     def _middle_line(self, points: FloatArray, place: Place) -> MiddleLine:
-        return MiddleLine(points, Landing.of(place, self.space.water).is_ashore)
+        way = way_to(self.space.free, self._shore, place)
+        entry = len(way) - 1 if LineString(way).length > ROUNDING_M else 0
+        return MiddleLine(points, Landing.of(place, self.space.water).is_ashore, entry)
 
     def _is_remote(self, share: Polygon, place: Place) -> bool:
         """Whether the way from a place comes to other free water before the share."""
@@ -294,7 +307,8 @@ class _Lanes:
     def beside_entry(self, place: Place) -> BaseGeometry:
         """Where legs may run from a place to the middle of the free space; over land to the berth alone."""
         landing = Landing.of(place, self.space.water)
-        strip = LineString(way_to(self.space.free, self.shore, place)).buffer(self.apart_m)
+        way = LineString(way_to(self.space.free, self.shore, place))
+        strip = way.buffer(min(self.apart_m, OPENING * way.length) + ROUNDING_M)
         return (strip & self.space.water) | LineString([landing.place, landing.berth]).buffer(ON_SHORE_M)
 
     def _entry(self, place: Place) -> FloatArray:
@@ -333,6 +347,18 @@ def _edge_middles(area: BaseGeometry, most: int) -> FloatArray:
     edges = np.stack([xy[:-1], xy[1:]], axis=1)[ring[:-1] == ring[1:]]
     longest = np.argsort(-np.hypot(*(edges[:, 1] - edges[:, 0]).T), kind="stable")[:most]
     return np.asarray(edges[longest].mean(axis=1))
+
+
+def _ever_more_beside(leg: FloatArray, apart_m: float) -> FloatArray:
+    """A leg without its first point, moved to its right: by a share of the way so far, and a distance at most."""
+    steps = np.diff(leg, axis=0)
+    if len(steps) == 0:
+        return leg[:0]
+    along_m = np.cumsum(np.hypot(*steps.T))
+    tangents = np.vstack([leg[2:] - leg[:-2], steps[-1:]])
+    right = np.column_stack([tangents[:, 1], -tangents[:, 0]]) / np.hypot(*tangents.T)[:, None]
+    aside_m = np.copysign(np.minimum(abs(apart_m), OPENING * along_m), apart_m)
+    return np.asarray(leg[1:] + aside_m[:, None] * right)
 
 
 def _beside(leg: FloatArray, apart_m: float) -> FloatArray:
