@@ -38,8 +38,9 @@ NEAR_GATES = 10.0
 """Gates of the way out and home that are no farther apart than so many times their legs become one."""
 OFF_M = 1e-2
 """A leg that strays so little from the water stays in it: what the certificate takes for the shore."""
-OPENING = 0.1
-"""The ways out and home open by this share of the way to the free space."""
+OPENING, BESIDE = 0.05, 0.15
+"""To each side, the ways out and home open by the first share of the way to the free space, and may run as far
+from it as the second: in a corner of the free space, where they part is outside of it."""
 FAR = 0.25
 """Legs that take more than this share of a range are told: they are missing where the vehicle surveys."""
 SPARE = 1.001
@@ -82,7 +83,7 @@ class Approach:
             Nothing: the legs alone are longer.
         """
         if self._legs_m >= range_m:
-            raise too_short(range_m, self._legs_m, what="the way to the vehicle's share and home")
+            raise too_short(range_m, self._legs_m, what="the way to the vehicle's share and home", suffices=False)
         return range_m - self._legs_m
 
     def warnings(self, range_m: float) -> tuple[str, ...]:
@@ -308,7 +309,7 @@ class _Lanes:
         """Where legs may run from a place to the middle of the free space; over land to the berth alone."""
         landing = Landing.of(place, self.space.water)
         way = LineString(way_to(self.space.free, self.shore, place))
-        strip = way.buffer(min(self.apart_m, OPENING * way.length) + ROUNDING_M)
+        strip = way.buffer(BESIDE * way.length + ROUNDING_M)
         return (strip & self.space.water) | LineString([landing.place, landing.berth]).buffer(ON_SHORE_M)
 
     def _entry(self, place: Place) -> FloatArray:

@@ -138,4 +138,5 @@ class Reach:
                     what="the way to the nearest water and home",
                     reserve=SPARE,
                     where=f"vehicle {vehicle.name!r}: length_m",
+                    suffices=False,
                 )

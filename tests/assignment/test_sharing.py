@@ -136,7 +136,7 @@ def test_a_strip_is_shared_in_triangles_as_long_as_they_suffice():
 def test_who_reaches_nothing_is_named():
     with pytest.raises(
         Infeasible,
-        match=r"'1': length_m: is 100 m; expected at least 1013\.\d m: .* home is 1003\.",
+        match=r"'1': length_m: is 100 m; expected more than 1013\.\d m: .* home is 1003\.",
     ):
         shares(CANAL, (*boats(8_000.0), replace(boats(100.0, place=(-500.0, 4.0))[0], name="1")))
 

@@ -153,7 +153,7 @@ def _courses(task: Task) -> Iterator[LineString]:
 def _shortest_way(task: Task) -> LineString:
     """From launch to recovery, with their legs."""
     waters = task.waters
-    router = make_router(RouteMethod.FUNNEL, waters.free)
+    router = make_router(RouteMethod.VISIBILITY, waters.free)
     ends = (shapely.get_coordinates(entry)[0] for entry in waters.entries)
     way = router.route(*ends).polyline
     whole = np.vstack([waters.launch.leg[:-1], way, waters.recovery.leg[-2::-1]])

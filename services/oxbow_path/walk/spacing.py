@@ -51,7 +51,10 @@ class Budget:
 
     def too_short(self, shortest_m: float) -> Infeasible:
         """The refusal where even the shortest path does not fit."""
-        return too_short(self.limit_m + self.spent_m, shortest_m + self.spent_m)
+        if self.spent_m == 0.0:
+            return too_short(self.limit_m, shortest_m)
+        way = "the shortest path to its share and home that was found"
+        return too_short(self.limit_m + self.spent_m, shortest_m + self.spent_m, what=way, suffices=False)
 
     def is_enough(self, trial: Trial) -> bool:
         """No smaller spacing need be tried."""
