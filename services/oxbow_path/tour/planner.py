@@ -46,7 +46,7 @@ LEAST_STEP = 0.1
 SAMPLES = 25
 """Low-discrepancy points per site."""
 
-MOST_SAMPLES = 250_000
+MOST_SAMPLES = 150_000
 
 LEAST_SITES = 4
 """Fewer sites have one tour only."""
