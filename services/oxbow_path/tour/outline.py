@@ -82,9 +82,22 @@ def _slit(region: Polygon, slits: Geometries) -> Polygon:
     if _is_whole(rest):
         return rest
     # Slits that together part it, but for those that join the parts again.
-    left = slits[~_joining(shapely.get_parts(rest), slits)]
-    rest = region.difference(shapely.union_all(left))
-    return rest if _is_whole(rest) else _slit_by_halves(region, slits)
+    joining = _joining(shapely.get_parts(rest), slits)
+    rest = region.difference(shapely.union_all(slits[~joining]))
+    if _is_whole(rest):
+        return rest
+    # What still parts it lies about the lesser parts: all else is slit at once.
+    parts = shapely.get_parts(rest)
+    parting = _touching(slits, np.delete(parts, np.argmax(shapely.area(parts))))
+    parting = _touching(slits, slits[parting])
+    rest = region.difference(shapely.union_all(slits[~joining & ~parting]))
+    return _slit_by_halves(rest, slits[parting]) if _is_whole(rest) else _slit_by_halves(region, slits)
+
+
+def _touching(slits: Geometries, areas: Geometries) -> Mask:
+    touching = np.zeros(len(slits), dtype=bool)
+    touching[STRtree(slits).query(areas, predicate="dwithin", distance=ROUNDING_M)[1]] = True
+    return touching
 
 
 def _is_whole(rest: BaseGeometry) -> TypeGuard[Polygon]:
