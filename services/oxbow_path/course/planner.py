@@ -39,6 +39,9 @@ EVENNESS_QUANTILE = 0.95
 GOOD = 1.6
 """A plan whose `_score_m` is no more spacings than this is taken at once: the other would hardly do better."""
 
+SPENT = 0.95
+"""A plan that uses less than this share of what is enough has length left for detours."""
+
 MANY = 30_000
 """A plan of more waypoints than this is taken at once: to refine another as long would take a minute."""
 
@@ -67,7 +70,8 @@ def best_plan(method: PathMethod, task: Task, display: Display) -> MethodPlan:
                 plans.append(_at_least(task, display, courses, refusal))
         if plans and (task.stop() or _is_good(plans[-1].path, task)):
             break
-    return _reaching(min(plans, key=lambda plan: _score_m(plan.path, task)), task)
+    best = _reaching(min(plans, key=lambda plan: _score_m(plan.path, task)), task)
+    return _spent(best, task, display) if best.path.length < SPENT * task.budget.enough_m else best
 
 
 def _is_good(path: LineString, task: Task) -> bool:
@@ -83,6 +87,14 @@ def _reaching(plan: MethodPlan, task: Task) -> MethodPlan:
         return plan
     path = with_detours(plan.path, task.waters, task.budget.most_m, reach_m=FAR * task.spacing_m)
     return replace(plan, path=path)
+
+
+def _spent(plan: MethodPlan, task: Task, display: Display) -> MethodPlan:
+    """A plan with much length left, which is spent on detours to what is far from it, and refined once more."""
+    path = with_detours(plan.path, task.waters, task.budget.most_m, reach_m=FAR * task.spacing_m)
+    if path.length == plan.path.length or task.stop():
+        return replace(plan, path=path)
+    return replace(plan, path=improved(Polyline.of(path, task.waters.passable.free_and_rounding), task, display))
 
 
 def _is_narrow(task: Task) -> bool:
