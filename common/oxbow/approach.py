@@ -83,7 +83,7 @@ class Approach:
             Nothing: the legs alone are longer.
         """
         if self._legs_m >= range_m:
-            raise too_short(range_m, self._legs_m, what="the way to the vehicle's share and home", suffices=False)
+            raise too_short(range_m, self._legs_m, what="the way to the vehicle's share and home")
         return range_m - self._legs_m
 
     def warnings(self, range_m: float) -> tuple[str, ...]:

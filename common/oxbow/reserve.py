@@ -22,9 +22,10 @@ def too_short(
     what: str = "the shortest path from launch to recovery",
     reserve: float = LENGTH_RESERVE,
     where: str = "Master_length",
-    suffices: bool = True,
 ) -> Infeasible:
-    """The refusal of a length that does not suffice, with one that does, or that is necessary.
+    """The refusal of a length that does not suffice, with what is necessary.
+
+    It may take a little more: how short a way is depends on how finely shores are drawn, and that on the length.
 
     Parameters
     ----------
@@ -38,13 +39,10 @@ def too_short(
         Share of the length that is kept back.
     where
         The field that the length comes from.
-    suffices
-        Whether as much is known to do.
     """
     least_m = math.ceil(_STEPS_PER_M * shortest_m / (1.0 - reserve)) / _STEPS_PER_M
-    expected = f"at least {least_m:.1f} m" if suffices else f"more than {least_m:.1f} m"
     return Infeasible(
-        f"is {length_m:.10g} m; expected {expected}: {what} is {shortest_m:.1f} m long, and {reserve:.1%} is kept"
-        " in reserve",
+        f"is {length_m:.10g} m; expected more than {least_m:.1f} m: {what} is {shortest_m:.1f} m long, and"
+        f" {reserve:.1%} is kept in reserve",
         where=where,
     )

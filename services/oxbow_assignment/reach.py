@@ -138,5 +138,4 @@ class Reach:
                     what="the way to the nearest water and home",
                     reserve=SPARE,
                     where=f"vehicle {vehicle.name!r}: length_m",
-                    suffices=False,
                 )

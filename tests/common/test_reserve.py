@@ -12,7 +12,7 @@ from oxbow.reserve import LENGTH_RESERVE, too_short
 @given(st.floats(0.01, 1e7), st.sampled_from([LENGTH_RESERVE, 0.01]))
 def test_the_length_that_is_asked_for_suffices_and_is_little_more(shortest_m, reserve):
     refusal = too_short(shortest_m / 2, shortest_m, reserve=reserve)
-    found = re.search(r"expected at least ([\d.]+) m: ", refusal.message)
+    found = re.search(r"expected more than ([\d.]+) m: ", refusal.message)
     assert found is not None
     least_m = float(found.group(1))
     assert shortest_m <= (1 - reserve) * least_m * (1 + 1e-12)
@@ -22,7 +22,7 @@ def test_the_length_that_is_asked_for_suffices_and_is_little_more(shortest_m, re
 def test_a_refusal_names_the_field_what_it_is_and_what_it_is_for():
     refusal = too_short(883.82, 883.32, what="the way home", where="Vehicles[1].Length")
     assert str(refusal) == (
-        "Vehicles[1].Length: is 883.82 m; expected at least 884.3 m: the way home is 883.3 m long, and"
+        "Vehicles[1].Length: is 883.82 m; expected more than 884.3 m: the way home is 883.3 m long, and"
         " 0.1% is kept in reserve"
     )
 

@@ -173,16 +173,20 @@ def test_the_method_is_asked_first_but_in_narrow_water():
             assert best_plan(unasked, task, display).path.length >= 0.95 * asked.length_m
 
 
-def test_length_that_a_method_leaves_is_spent_on_what_it_leaves_away():
-    """Two rings of canals, one in the other: the ring's start takes the outer one, and half the length."""
+@pytest.mark.parametrize(
+    ("length_m", "launch", "recovery"),
+    [(1200.0, (-120.0, 0.0), (40.0, 0.0)), (1810.0, (0.0, 120.0), (0.0, -40.0))],
+)
+def test_length_that_a_method_leaves_is_spent_on_what_it_leaves_away(length_m, launch, recovery):
+    """Canals in rings, one in the other: the first path takes the outer one, and half the length."""
     rings = [Point(0, 0).buffer(r + 2.5).difference(Point(0, 0).buffer(r - 2.5)) for r in (40.0, 80.0, 120.0)]
     water = shapely.union_all([*rings, box(-121, -2.5, -38, 2.5), box(38, -2.5, 121, 2.5)])
     asked = request(
         water,
-        spacings=1810 / math.sqrt(water.area),
+        spacings=length_m / math.sqrt(water.area),
         safety=1 / math.sqrt(water.area),
-        launch=(-120.0, 0.0),
-        recovery=(40.0, 0.0),
+        launch=launch,
+        recovery=recovery,
         method=Method.SPACE_FILLING_CURVE,
     )
     plan = handle(asked, discard)

@@ -293,7 +293,7 @@ def test_where_nothing_fits_the_shortest_path_is_named():
         return trial_of(2000.0 + 1e5 / pattern.spacing_m, pattern.spacing_m)
 
     with pytest.raises(
-        Infeasible, match=r"is 1000 m; expected at least 2002\.\d m: the shortest .* is 2000\.\d m"
+        Infeasible, match=r"is 1000 m; expected more than 2002\.\d m: the shortest .* is 2000\.\d m"
     ):
         fitted(never_short, 10.0, Budget(limit_m=1000.0), widest_m=1e4)
 

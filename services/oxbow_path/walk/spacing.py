@@ -54,7 +54,7 @@ class Budget:
         if self.spent_m == 0.0:
             return too_short(self.limit_m, shortest_m)
         way = "the shortest path to its share and home that was found"
-        return too_short(self.limit_m + self.spent_m, shortest_m + self.spent_m, what=way, suffices=False)
+        return too_short(self.limit_m + self.spent_m, shortest_m + self.spent_m, what=way)
 
     def is_enough(self, trial: Trial) -> bool:
         """No smaller spacing need be tried."""
