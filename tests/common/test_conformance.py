@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Polygon, affinity, box
 
@@ -112,14 +112,19 @@ def test_a_path_that_never_enters_the_water_is_outside():
 
 @settings(deadline=None, max_examples=40, derandomize=True)
 @given(
-    st.lists(st.tuples(st.floats(-60, 460), st.floats(-60, 260)), min_size=2, max_size=8, unique=True),
+    st.lists(
+        st.tuples(st.integers(-60, 460).map(lambda x: x + 0.37), st.integers(-60, 260).map(lambda y: y + 0.73)),
+        min_size=2,
+        max_size=8,
+        unique=True,
+    ),
     st.floats(0.0, 6.28),
 )
 def test_metres_are_those_of_the_overlay_and_do_not_depend_on_the_frame(points, angle_rad):
     water = LAKE.difference(shapely.Point(200, 100).buffer(40))
     path = LineString(points)
-    if path.length < 1.0:
-        return
+    # An overlay counts once what a path runs over twice; and what just touches a bound may turn to either side.
+    assume(path.is_simple)
     found = conduct(points, water)
     assert found.outside_m == pytest.approx(path.difference(water.buffer(0.01)).length, abs=0.05)
     turned, turned_water = (affinity.rotate(each, angle_rad, (0, 0), use_radians=True) for each in (path, water))

@@ -20,7 +20,7 @@ from mission_files import INFEASIBLE_SEED, POISON_SEED, listening, mission_file,
 from oxbow import Client
 from oxbow.bus import Bus
 from oxbow.contracts import MissionState, MissionStatus
-from oxbow.errors import Internal
+from oxbow.errors import Internal, Unavailable
 from oxbow.mission import parse_mission
 from oxbow_mission.database import Database
 from oxbow_mission.store import SCHEMA, Request, Store
@@ -61,7 +61,8 @@ def test_a_full_disk_loses_no_mission(
     with Client(router, timeout_s=WAIT_S) as client:
         client.submit(mission_file(), mission_id="full")
         psutil.Process(service.pid).rlimit(psutil.RLIMIT_FSIZE, (1, 1))
-        with pytest.raises(Internal):
+        # The service says why and ends; on a busy machine its link may be gone before the reply is.
+        with pytest.raises((Internal, Unavailable)):
             client.submit(mission_file(), mission_id="too-much")
         start_stages()
         assert service.wait(WAIT_S) == 1

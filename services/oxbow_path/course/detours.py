@@ -18,6 +18,7 @@ from oxbow.arrays import Indices
 from oxbow.contracts import FloatArray
 from oxbow.route.gate_routes import Inward
 from oxbow.tolerances import ROUNDING_M
+from oxbow_path.walk.legs import is_plainly_simple
 from oxbow_path.walk.region import largest
 from oxbow_path.walk.stretch import stretch
 from oxbow_path.walk.trial import Waters
@@ -26,6 +27,9 @@ __all__ = ["detoured", "with_detours"]
 
 HALF_WIDTH = 0.12
 """Half width of a detour at first, in spacings: narrow, so that it parts the water that it runs into."""
+
+GAP = 0.1
+"""A strip keeps so far from the rest of the path, in half widths."""
 
 SHORT_OF = 0.25
 """A detour ends so far from the place that it is made for, in spacings."""
@@ -139,8 +143,13 @@ def _way_out(path: LineString, ways: _Ways, gap: FloatArray) -> LineString:
     way = ways.inward.route(gap)
     if way is None:
         return straight
-    met = shapely.get_coordinates(way.intersection(path))
-    end_m = min((way.project(Point(place)) for place in met), default=way.length)
+    # The path may have been led along this very way since: what is beside it is no way to it.
+    points = shapely.get_coordinates(way)
+    met = np.flatnonzero(shapely.dwithin(shapely.points(points), path, HALF_WIDTH * waters.spacing_m))
+    if len(met) and met[0] > 0:
+        way = LineString(points[: met[0] + 1])
+    crossed = shapely.get_coordinates(way.intersection(path))
+    end_m = min((way.project(Point(place)) for place in crossed), default=way.length)
     way = _part(way, 0.0, end_m) if end_m > ROUNDING_M else way
     onto = shapely.get_coordinates(shapely.shortest_line(Point(way.coords[-1]), path))[1]
     return LineString(np.vstack([onto, shapely.get_coordinates(way)[::-1]]))
@@ -166,8 +175,9 @@ def _round(path: LineString, out: LineString, waters: Waters, half_width_m: floa
         longer = _from_end(path.reverse(), out, waters, half_width_m)
         longer = None if longer is None else longer.reverse()
     else:
-        longer = _past(path, strip)
-    return longer if longer is not None and longer.is_simple else None
+        longer = _past(path, strip, waters, GAP * half_width_m)
+    # Simple by rounding alone, a path would not stay so.
+    return longer if longer is not None and is_plainly_simple(longer) else None
 
 
 def _strip(out: LineString, waters: Waters, half_width_m: float) -> Polygon:
@@ -180,17 +190,21 @@ def _is_leg(path: LineString, waters: Waters) -> bool:
     return not shapely.covers(waters.passable.free_and_rounding, first)
 
 
-def _crossing(path: LineString, strip: Polygon) -> LineString | None:
-    """Where a path crosses a strip; None unless it does so once."""
+def _crossing(path: LineString, strip: Polygon, gap_m: float) -> LineString | None:
+    """Where a path crosses a strip or is nearer to it than a gap; None unless it does so once.
+
+    Strips in narrow water end at its rim, where the path may run already: it touches them there, or by rounding
+    crosses them many times.
+    """
     if strip.is_empty or strip.interiors:
         return None
-    crossed = shapely.line_merge(path.intersection(strip))
+    crossed = shapely.line_merge(path.intersection(strip.buffer(gap_m, quad_segs=QUAD_SEGS)))
     return crossed if isinstance(crossed, LineString) and crossed.length >= ROUNDING_M else None
 
 
-def _past(path: LineString, strip: Polygon) -> LineString | None:
+def _past(path: LineString, strip: Polygon, waters: Waters, gap_m: float) -> LineString | None:
     """A path led round a strip that it crosses."""
-    crossed = _crossing(path, strip)
+    crossed = _crossing(path, strip, gap_m)
     if crossed is None:
         return None
     start_m, end_m = sorted(path.project(shapely.points(crossed.coords[i])) for i in (0, -1))
@@ -198,7 +212,10 @@ def _past(path: LineString, strip: Polygon) -> LineString | None:
         # The strip holds the path's two ends, which are one place.
         return None
     head, tail = (shapely.get_coordinates(_part(path, *ends)) for ends in ((0.0, start_m), (end_m, path.length)))
-    longer = LineString(np.vstack([head, _way_round(strip, head[-1], tail[0]), tail]))
+    way = np.vstack([head[-1:], _way_round(strip, head[-1], tail[0]), tail[:1]])
+    if not shapely.covers(waters.passable.free_and_rounding, LineString(way)):
+        return None
+    longer = LineString(np.vstack([head[:-1], way, tail[1:]]))
     return LineString(shapely.remove_repeated_points(longer, ROUNDING_M).coords)
 
 
@@ -208,7 +225,7 @@ def _from_end(path: LineString, out: LineString, waters: Waters, half_width_m: f
     onward = shapely.get_coordinates(_part(out, out.project(start), out.length))
     out = LineString(shapely.remove_repeated_points(LineString(np.vstack([path.coords[0], onward])), ROUNDING_M))
     strip = _strip(out, waters, half_width_m)
-    crossed = _crossing(path, strip)
+    crossed = _crossing(path, strip, GAP * half_width_m)
     if crossed is None or not shapely.covers(strip, out):
         return None
     leaves_m = max(path.project(shapely.points(crossed.coords[i])) for i in (0, -1))
@@ -217,8 +234,10 @@ def _from_end(path: LineString, out: LineString, waters: Waters, half_width_m: f
     tail = shapely.get_coordinates(_part(path, leaves_m, path.length))
     ring = LineString(strip.exterior)
     turn = shapely.get_coordinates(shapely.shortest_line(Point(out.coords[-1]), ring))[1]
-    back = _way_along(strip, turn, tail[0], longer=False)
-    longer = LineString(np.vstack([shapely.get_coordinates(out), back, tail]))
+    back = np.vstack([turn, _way_along(strip, turn, tail[0], longer=False), tail[:1]])
+    if not shapely.covers(waters.passable.free_and_rounding, LineString(back)):
+        return None
+    longer = LineString(np.vstack([shapely.get_coordinates(out), back, tail[1:]]))
     return LineString(shapely.remove_repeated_points(longer, ROUNDING_M).coords)
 
 
