@@ -28,7 +28,7 @@ __all__ = ["detoured", "with_detours"]
 HALF_WIDTH = 0.12
 """Half width of a detour at first, in spacings: narrow, so that it parts the water that it runs into."""
 
-GAP = 0.1
+GAP = 0.02
 """A strip keeps so far from the rest of the path, in half widths."""
 
 SHORT_OF = 0.25
