@@ -9,7 +9,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely import LineString, Point, Polygon, affinity, box
+from shapely import LineString, MultiPolygon, Point, Polygon, affinity, box
 
 from oxbow.conformance import crossings_of
 from oxbow.contracts import Certificate, CertifyRequest, DangerZone, Per, Track
@@ -20,7 +20,9 @@ from oxbow.plan import PlanOptions
 from oxbow.recording import Layer, discard
 from oxbow.testing import nasty_polygons
 from oxbow_certificate.cover import least_radius
+from oxbow_certificate.distance import PathDistance
 from oxbow_certificate.service import handle
+from oxbow_certificate.spread import distance_spread
 from oxbow_cli.evaluation import evaluate
 from oxbow_cli.local import local_call
 from real_lakes import mission_file, needs_referee, referee
@@ -191,7 +193,7 @@ def test_every_step_is_shown():
 @needs_referee
 @pytest.mark.parametrize("name", ["N72.1W106.5", "S04.2E015.4"])
 def test_agrees_with_the_independent_judge(name):
-    options = PlanOptions(time_limit_s=0.1)
+    options = PlanOptions(time_limit_s=1e-3)  # no step of refinement: the same path on any machine
     mission = plan_mission(read_mission(mission_file(name)), options, call=local_call())
     judged = referee().judge(json.loads(mission_json(mission)))
     assert mission.plan is not None
@@ -199,8 +201,20 @@ def test_agrees_with_the_independent_judge(name):
         assert own.crossings == judged["crossings"] == 0
         assert own.outside_m == judged["outside_m"] == 0
         assert own.unsafe_m == pytest.approx(judged["unsafe_m"], abs=0.01)
-        for measure in ("length_m", "free_area_m2", "q", "mean_distance_m", "p95_distance_m", "judged_area"):
+        for measure in ("length_m", "free_area_m2", "q", "judged_area"):
             assert getattr(own, measure) == pytest.approx(judged[measure], rel=0.01), measure
+        # The judge draws its 40 000 places at random: its own figures scatter by 1 % from seed to seed.
+        for measure in ("mean_distance_m", "p95_distance_m"):
+            assert getattr(own, measure) == pytest.approx(judged[measure], rel=0.03), measure
+
+
+def test_the_spread_of_distance_is_that_of_many_more_places():
+    pond = Polygon([(0, 0), (900, 100), (700, 300), (1000, 900), (400, 600), (100, 1000)])
+    region = MultiPolygon([pond.difference(box(300, 300, 400, 350))])
+    distance = PathDistance(LineString([(0, 0), (600, 300), (900, 800)]))
+    few, many = distance_spread(region, distance), distance_spread(region, distance, count=500_000)
+    for measure in ("mean_m", "p95_m", "p99_m"):
+        assert getattr(few, measure) == pytest.approx(getattr(many, measure), rel=0.005), measure
 
 
 def rows(heights, west=5.0, east=95.0) -> LineString:

@@ -8,6 +8,7 @@ these routes lead to whatever place of an area is nearest, and keep to the middl
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -21,7 +22,7 @@ from oxbow.contracts import FloatArray
 from oxbow.errors import Internal
 from oxbow.route.channel import Gates
 from oxbow.route.mesh import Mesh
-from oxbow.route.search import WaysTo, cheapest_ways, cheapest_ways_to
+from oxbow.route.search import Arcs, WaysTo, cheapest_ways, cheapest_ways_to
 
 __all__ = ["Inward", "Routes", "taut"]
 
@@ -74,11 +75,20 @@ class Routes:
 
     def into(self, area: BaseGeometry, goals: Indices) -> Inward:
         """The shortest routes from everywhere into an area, for many at once; else as `to_area`."""
-        end = None
-        if len(goals) == 0:
-            end = shapely.get_coordinates(area.representative_point())[0]
-            goals = self._gates.mesh.twins[self._gates_out_of(self._triangle_at(end))]
-        return Inward(self, cheapest_ways_to(self._graph, goals), end)
+        places = self._gates.places
+        if len(goals):
+            return Inward(places, cheapest_ways_to(self._graph, goals), self._gates_from)
+        end = shapely.get_coordinates(area.representative_point())
+        around, goal = self._triangle_at(end), len(places)
+        # The area's point becomes a place of the network, so that the step to it counts in the search.
+        last = self._gates.mesh.twins[self._gates_out_of(around)]
+        steps = Arcs(last, np.full(len(last), goal), np.hypot(*(places[last] - end).T))
+        ways = cheapest_ways_to((self._gates.arcs + steps).graph(goal + 1), np.array([goal]))
+
+        def from_place(start: FloatArray) -> Indices:
+            return np.array([goal]) if self._triangle_at(start) == around else self._gates_from(start)
+
+        return Inward(np.vstack([places, end]), ways, from_place)
 
     def to_area(self, start: FloatArray, area: BaseGeometry, goals: Indices) -> LineString | None:
         """The shortest route from a point of the water into an area; None if none leads there.
@@ -103,13 +113,16 @@ class Routes:
     def _triangle_at(self, place: FloatArray) -> int:
         return int(self._gates.mesh.located(np.atleast_2d(place))[0])
 
+    def _gates_from(self, place: FloatArray) -> Indices:
+        return self._gates_out_of(self._triangle_at(place))
+
     def _gates_out_of(self, triangle: int) -> Indices:
         sides = 3 * triangle + np.arange(3)
         return np.asarray(sides[self._gates.mesh.twins[sides] >= 0])
 
     def _way(self, start: FloatArray, goals: Indices, onward: FloatArray | None = None) -> FloatArray | None:
         """Middles of gates on the shortest way from a place to one of some gates, and from there onward."""
-        places, first = self._gates.places, self._gates_out_of(self._triangle_at(start))
+        places, first = self._gates.places, self._gates_from(start)
         if len(first) == 0 or len(goals) == 0:
             return None
         ways = cheapest_ways(self._graph, first)
@@ -127,19 +140,19 @@ class Inward:
 
     Parameters
     ----------
-    routes
-        The water's routes.
+    places
+        Those of the network, shape (n, 2), in metres.
     ways
-        From each gate to the area.
-    end
-        Where to go from the last gate, into an area too small to hold any.
+        From each of them to the area.
+    first
+        The numbers of the places that a straight step leads to from anywhere in the water.
     """
 
-    def __init__(self, routes: Routes, ways: WaysTo, end: FloatArray | None) -> None:
-        self._routes = routes
+    def __init__(self, places: FloatArray, ways: WaysTo, first: Callable[[FloatArray], Indices]) -> None:
+        self._places = places
         self._ways = ways
-        self._end = end
-        self._passed = np.zeros(len(ways.costs), dtype=bool)
+        self._first = first
+        self._passed = np.zeros(len(places), dtype=bool)
 
     def route(self, start: FloatArray, unused_m: float = math.inf) -> LineString | None:
         """The route from a place; None if none leads there.
@@ -151,21 +164,15 @@ class Inward:
         unused_m
             How much of its beginning no later route may end on; by default, none ends on it at all.
         """
-        places = self._routes._gates.places
-        triangle = self._routes._triangle_at(start)
-        if self._end is not None and triangle == self._routes._triangle_at(self._end):
-            return LineString([start, self._end])
-        first = self._routes._gates_out_of(triangle)
-        length_m = np.hypot(*(places[first] - start).T) + self._ways.costs[first]
+        first = self._first(start)
+        length_m = np.hypot(*(self._places[first] - start).T) + self._ways.costs[first]
         if not np.isfinite(length_m).any():
             return None
-        gates = np.array(self._ways.way(int(first[np.argmin(length_m)])))
-        met = np.flatnonzero(self._passed[gates])
-        points = np.vstack([start, places[gates[: met[0] + 1] if len(met) else gates]])
+        way = np.array(self._ways.way(int(first[np.argmin(length_m)])))
+        met = np.flatnonzero(self._passed[way])
+        points = np.vstack([start, self._places[way[: met[0] + 1] if len(met) else way]])
         along_m = np.cumsum(np.hypot(*np.diff(points, axis=0).T))
-        self._passed[gates[: len(along_m)][along_m > unused_m]] = True
-        if self._end is not None and not len(met):
-            points = np.vstack([points, self._end])
+        self._passed[way[: len(along_m)][along_m > unused_m]] = True
         return LineString(points)
 
 
