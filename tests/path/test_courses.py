@@ -212,3 +212,12 @@ def test_detours_in_a_bent_canal_keep_off_the_path_that_runs_along_its_rim(metho
     plan = handle(asked, discard)
     assert 0.9 * asked.length_m <= plan.path.length <= asked.length_m
     assert is_plainly_simple(plan.path)
+
+
+def test_the_shortest_way_is_a_plan_whatever_the_method_finds():
+    """From an islet to the shore, with less length than a walk round the water's edge takes."""
+    islet = Point(500, 400).buffer(25, quad_segs=3)
+    water = box(0, 0, 1000, 800).difference(islet)
+    asked = request(water, launch=islet.exterior.coords[1], recovery=(700.0, 0.0), spacings=2.0, safety=0.0)
+    plan = handle(asked, discard)
+    assert plan.path.length <= asked.length_m
