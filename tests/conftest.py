@@ -2,7 +2,12 @@
 
 import signal
 
+import hypothesis
 import pytest
+
+# The same examples on any day and machine, however long one takes: a failure is of the change, and comes again.
+hypothesis.settings.register_profile("same", derandomize=True, deadline=None)
+hypothesis.settings.load_profile("same")
 
 
 @pytest.fixture(scope="session", autouse=True)

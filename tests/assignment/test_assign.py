@@ -18,7 +18,7 @@ from oxbow_assignment.matching import match
 from oxbow_assignment.problem import Objective, Problem
 from oxbow_assignment.pseudo_coordinates import pseudo_coordinates
 
-quick = settings(deadline=None, max_examples=20, derandomize=True)
+quick = settings(max_examples=20)
 seeds = st.integers(0, 10_000)
 needs_pyvrp = pytest.mark.skipif(not joint.is_available(), reason="needs the extra `fleet`")
 

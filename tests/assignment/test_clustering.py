@@ -10,7 +10,7 @@ from oxbow.errors import InvalidMission
 from oxbow_assignment.clustering import cluster_by_radius, faded, fuzzy_c_means, k_means, mean_distances
 from oxbow_assignment.pseudo_coordinates import pseudo_coordinates
 
-quick = settings(deadline=None, max_examples=25, derandomize=True)
+quick = settings(max_examples=25)
 seeds = st.integers(0, 10_000)
 
 

@@ -10,7 +10,7 @@ from scipy.spatial.distance import cdist
 
 from oxbow_assignment.ordering import EXACT_MOST, best_path, exact_path, improved_path, inserted_path, path_length
 
-quick = settings(deadline=None, max_examples=25, derandomize=True)
+quick = settings(max_examples=25)
 
 
 def distances_between(seed, rows, is_plane=True):

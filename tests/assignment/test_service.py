@@ -25,7 +25,7 @@ from oxbow_assignment.service import handle
 from oxbow_contour.service import handle as contour
 from real_lakes import MISSIONS, needs_missions
 
-quick = settings(deadline=None, max_examples=8, derandomize=True)
+quick = settings(max_examples=8)
 replaced = msgspec.structs.replace
 
 POND = box(0, 0, 1_000, 600)

@@ -25,7 +25,7 @@ from oxbow_assignment.sorties import scheduled
 from oxbow_assignment.spots import waters
 from oxbow_assignment.treatment import COVERED, MOST_PASSES, Treatment, treatment_of
 
-quick = settings(deadline=None, max_examples=10, derandomize=True)
+quick = settings(max_examples=10)
 SEA = box(-1_000, -1_000, 1_000, 1_000)
 
 

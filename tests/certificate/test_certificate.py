@@ -28,7 +28,7 @@ from oxbow_cli.local import local_call
 from real_lakes import mission_file, needs_referee, referee
 
 SQUARE = box(0, 0, 100, 100)
-quick = settings(deadline=None, max_examples=8, derandomize=True)
+quick = settings(max_examples=8)
 
 
 def certified(path, outline: Polygon = SQUARE, **changes) -> Certificate:

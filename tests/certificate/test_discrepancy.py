@@ -11,7 +11,7 @@ from oxbow.testing import nasty_polygons
 from oxbow_certificate.discrepancy import discrepancy, unit_square
 from oxbow_certificate.spread import even_places
 
-quick = settings(deadline=None, max_examples=15, derandomize=True)
+quick = settings(max_examples=15)
 RECTANGLE = MultiPolygon([box(0, 0, 200, 100)])
 LAKE = MultiPolygon([box(0, 0, 200, 100).difference(Point(120, 40).buffer(30)), box(210, 20, 260, 60)])
 

@@ -10,7 +10,7 @@ from shapely import LineString, box
 from oxbow_certificate.axes import long_side, main_direction, turned
 from oxbow_certificate.distance import PathDistance
 
-quick = settings(deadline=None, max_examples=20, derandomize=True)
+quick = settings(max_examples=20)
 walks = st.lists(st.tuples(st.floats(-100, 100), st.floats(-100, 100)), min_size=2, max_size=12, unique=True)
 
 

@@ -10,7 +10,7 @@ from shapely import LineString, Point, affinity
 
 from oxbow_certificate.headings import count_turns, directional_evenness
 
-quick = settings(deadline=None, max_examples=30, derandomize=True)
+quick = settings(max_examples=30)
 CORNER = [(0, 0), (100, 0), (100, 100)]
 
 

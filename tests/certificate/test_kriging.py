@@ -22,7 +22,7 @@ from oxbow_certificate.kriging import (
 from oxbow_certificate.spread import even_places
 
 SQUARE = box(0, 0, 100, 100)
-quick = settings(deadline=None, max_examples=25, derandomize=True)
+quick = settings(max_examples=25)
 models = st.sampled_from(VariogramModel)
 
 

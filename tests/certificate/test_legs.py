@@ -10,7 +10,7 @@ from shapely import LineString, Point, affinity
 
 from oxbow_certificate.legs import least_leg_distance
 
-quick = settings(deadline=None, max_examples=20, derandomize=True)
+quick = settings(max_examples=20)
 NOWHERE = Point()
 
 

@@ -18,7 +18,7 @@ SPACE = FreeSpace(free=FREE, water=LAKE, tolerance_m=1.0, compression=1.0)
 EAST = FREE & box(600, 0, 1000, 400)
 SPACING_M = 20.0
 
-quick = settings(deadline=None, max_examples=40, derandomize=True)
+quick = settings(max_examples=40)
 ashore = st.tuples(st.floats(-20, 0), st.floats(10, 390))
 afloat = st.tuples(st.floats(6, 290), st.floats(6, 390))
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import threading
 from collections import Counter
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from oxbow.bus.replicas import Replicas
@@ -64,7 +64,6 @@ def test_stages_are_apart_and_missing_ones_are_named() -> None:
 @given(
     st.lists(st.tuples(st.sampled_from(["come", "go", "acquire", "release"]), st.sampled_from("abc")), max_size=60)
 )
-@settings(deadline=None)
 def test_no_replica_is_overloaded_and_none_idles_while_another_has_more(events: list[tuple[str, str]]) -> None:
     known, alive, held = replicas(), set[str](), Counter[str]()
     for event, instance in events:

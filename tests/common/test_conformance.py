@@ -110,7 +110,7 @@ def test_a_path_that_never_enters_the_water_is_outside():
     assert Rule.OUTSIDE in rules(found)
 
 
-@settings(deadline=None, max_examples=40, derandomize=True)
+@settings(max_examples=40)
 @given(
     st.lists(
         st.tuples(st.integers(-60, 460).map(lambda x: x + 0.37), st.integers(-60, 260).map(lambda y: y + 0.73)),

@@ -35,7 +35,7 @@ def meet_inside(one, other):
     )
 
 
-@settings(deadline=None, max_examples=150, derandomize=True)
+@settings(max_examples=150)
 @given(rings.filter(lambda ring: len(ring) > 2), rings.filter(lambda ring: len(ring) > 2))
 def test_meetings_are_those_by_definition(ring, other):
     edges = Edges.of(np.array([Polygon(ring), Polygon(other)]))
@@ -47,7 +47,7 @@ def test_meetings_are_those_by_definition(ring, other):
     assert found(edges, of=of_first) == {pair for pair in expected if of_first[list(pair)].any()}
 
 
-@settings(deadline=None, max_examples=150, derandomize=True)
+@settings(max_examples=150)
 @given(rings.filter(lambda ring: len(ring) > 2))
 @pytest.mark.parametrize("most_pairs", [crossings.MOST_PAIRS, 8])
 def test_a_ring_has_a_contact_where_it_is_no_valid_polygon(most_pairs, ring):

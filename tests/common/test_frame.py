@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from oxbow.frame import Frame, geodesic_length_m
 
 
-@settings(deadline=None, max_examples=50, derandomize=True)
+@settings(max_examples=50)
 @given(
     lat=st.floats(-80, 80),
     long=st.floats(-180, 180),
@@ -18,7 +18,7 @@ def test_there_and_back(lat, long, xy):
     assert np.abs(frame.to_planar(frame.to_degrees(points)) - points).max() < 1e-4
 
 
-@settings(deadline=None, max_examples=50, derandomize=True)
+@settings(max_examples=50)
 @given(lat=st.floats(-80, 80), angle=st.floats(0, 6.28), distance=st.floats(1, 1.5e5))
 def test_planar_lengths_are_geodesic_within_a_ten_thousandth(lat, angle, distance):
     frame = Frame(lat, 12.0)

@@ -17,7 +17,7 @@ from oxbow.mesh.refinement import refined
 from oxbow.mesh.triangulation import Triangulation
 from oxbow.testing import nasty_polygons
 
-quick = settings(deadline=None, max_examples=6, derandomize=True)
+quick = settings(max_examples=6)
 
 
 def require_tiling(mesh: Mesh, area: Polygon) -> None:

@@ -206,7 +206,7 @@ json_values = st.recursive(
 )
 
 
-@settings(deadline=None, max_examples=60, derandomize=True)
+@settings(max_examples=60)
 @given(
     extra=st.dictionaries(st.text(min_size=1, max_size=8).map(lambda name: f"x-{name}"), json_values, max_size=3),
     safety=st.floats(0, 1e4),

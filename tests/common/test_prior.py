@@ -189,7 +189,7 @@ def disc(draw):
     return Point(long, lat).buffer(radius, quad_segs=3)
 
 
-@settings(deadline=None, max_examples=40, derandomize=True)
+@settings(max_examples=40)
 @given(st.lists(st.sampled_from([0.0, 0.5, 1.0, 2.0, 7.0]), min_size=1, max_size=8), st.integers(0, 2**16))
 def test_every_place_has_the_weight_painted_on_it_last(given_weights, seed):
     draw = np.random.default_rng(seed)
@@ -215,7 +215,7 @@ def as_json(features):
     return json.dumps(prior_document(PriorModel(features=tuple(features)))).encode()
 
 
-@settings(deadline=None, max_examples=40, derandomize=True)
+@settings(max_examples=40)
 @given(
     weight=st.none() | st.floats(0, 1e9),
     value=st.floats(-1e9, 1e9),

@@ -143,7 +143,7 @@ cell_weights = arrays.arrays(
 )
 
 
-@settings(deadline=None, max_examples=60, derandomize=True)
+@settings(max_examples=60)
 @given(cell_weights.filter(lambda weights: not np.isnan(weights).all()))
 def test_every_cell_lies_in_the_polygon_of_its_weight_and_in_no_other(weights):
     features = grid(weights).features()

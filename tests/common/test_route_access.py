@@ -46,7 +46,7 @@ def test_by_a_hair_ashore_is_on_the_shore(off_m):
 
 
 @given(place=st.tuples(st.floats(-30, 190), st.floats(-30, 120)))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 def test_land_is_crossed_once_straight_from_the_place_to_the_water(place):
     line = LineString(way_to(AREA, Routes(WATER), place))
     distance_m = WATER.distance(Point(place))

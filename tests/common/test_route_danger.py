@@ -14,7 +14,7 @@ from oxbow.contracts import DangerZone, Per
 from oxbow.errors import InvalidMission
 from oxbow.route import Danger, RouteMethod, make_router
 
-quick = settings(deadline=None, max_examples=10, derandomize=True)
+quick = settings(max_examples=10)
 every_method = pytest.mark.parametrize("method", RouteMethod)
 WATER = box(0, 0, 100, 100)
 MIDDLE = box(40, 30, 60, 70)

@@ -14,7 +14,7 @@ from oxbow.route import Danger, DynamicRouter, RouteMethod, make_router
 from oxbow.testing import nasty_polygons
 from oxbow.triangles import cross
 
-quick = settings(deadline=None, max_examples=12, derandomize=True)
+quick = settings(max_examples=12)
 GRID_M = 1e-5
 """More than what the grid of obstacles' vertices can move."""
 

@@ -22,7 +22,7 @@ from oxbow.route.tessellation import RINGS, Tessellation, lattice
 from oxbow.testing import nasty_polygons
 
 ROUNDING_M = 1e-6
-quick = settings(deadline=None, max_examples=15, derandomize=True)
+quick = settings(max_examples=15)
 seeds = st.integers(0, 100_000)
 every_method = pytest.mark.parametrize("method", RouteMethod)
 

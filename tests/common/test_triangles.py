@@ -25,7 +25,7 @@ from oxbow.triangles import (
     twins_of,
 )
 
-quick = settings(deadline=None, max_examples=20, derandomize=True)
+quick = settings(max_examples=20)
 
 
 @pytest.mark.parametrize("name", sorted(nasty_polygons()))

@@ -117,7 +117,7 @@ given_boats = st.lists(
 )
 
 
-@settings(deadline=None, max_examples=40, derandomize=True)
+@settings(max_examples=40)
 @given(boats=given_boats)
 def test_vehicles_are_written_as_they_came(boats):
     boats = [*boats, boat("the one that is needed")]

@@ -25,7 +25,7 @@ polygons = st.builds(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(polygons, st.sampled_from([1e-6, 0.1, 3.0, 20.0]))
 def test_nothing_left_is_nearer_than_the_distance(water, distance_m):
     for part in erode([water], distance_m):
@@ -34,7 +34,7 @@ def test_nothing_left_is_nearer_than_the_distance(water, distance_m):
         assert part.boundary.distance(water.boundary) >= distance_m * (1 - EXACT) - 1e-12
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(polygons, st.sampled_from([0.1, 3.0, 20.0]))
 def test_what_is_farther_than_the_distance_is_left(water, distance_m):
     left = shapely.union_all(erode([water], distance_m))
@@ -42,7 +42,7 @@ def test_what_is_farther_than_the_distance_is_left(water, distance_m):
     assert must_stay.difference(left).area <= 1e-9 * water.area
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 9), st.sampled_from([1e-5, 1.0]))
 @example(seed=567, edges=9, excess_m=1.0)
 @example(seed=204, edges=6, excess_m=1e-5)
@@ -56,7 +56,7 @@ def test_short_edges_beside_long_ones_are_kept_away_from_as_well(seed, edges, ex
         assert part.boundary.distance(water.boundary) >= 5.0 * (1 - EXACT)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(polygons, st.sampled_from([1e-2, 1e-3, 1e-4]))
 def test_what_is_farther_than_the_distance_and_its_excess_is_left(water, share):
     distance_m = 20.0

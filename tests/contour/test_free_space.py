@@ -61,7 +61,7 @@ def assert_safe(space: FreeSpace, outline: Polygon, zones, safety_m: float) -> N
     assert distance_m >= safety_m * (1 - 1e-9)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     sites,
     st.sampled_from([0.0, 0.01, 1.0, 5.0]),
@@ -80,7 +80,7 @@ def test_free_space_is_inside_the_true_outline_less_the_safety_distance(site, sa
     assert space.water.contains(space.free)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(sites, st.sampled_from([0.5, 3.0]))
 @example(ragged_site(0, 225, 0.9, 0), 3.0)
 @example(ragged_site(13, 82, 0.0, 5), 3.0)
@@ -111,7 +111,7 @@ def test_nasty_sites(name, tolerance_m, safety_m):
     assert_safe(space, outline, zones, safety_m)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(sites, st.floats(0, 360), st.sampled_from([0.01, 1.0, 1000.0]), st.sampled_from([0.0, 1e3, 1e4]))
 def test_moving_turning_and_scaling_a_site_does_the_same_to_its_free_space(site, degrees, scale, shift):
     def moved(shape: Polygon) -> Polygon:
@@ -131,7 +131,7 @@ def test_moving_turning_and_scaling_a_site_does_the_same_to_its_free_space(site,
     assert moved(here.free).symmetric_difference(there.free).area <= displaced_m * there.free.length
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(sites)
 def test_the_same_site_gives_the_same_bytes(site):
     def reply() -> bytes:
@@ -143,7 +143,7 @@ def test_the_same_site_gives_the_same_bytes(site):
     assert reply() == reply()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(sites, st.sampled_from([20.0, 60.0, 1000.0]))
 def test_the_safety_distance_named_when_infeasible_leaves_water(site, safety_m):
     outline, zones = site

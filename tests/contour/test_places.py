@@ -115,7 +115,7 @@ shapes = st.lists(
 
 
 @given(zones=shapes, width_m=st.sampled_from([0.01, 0.1, 3.0]))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 def test_all_that_is_wide_stays_and_nothing_is_added(zones, width_m):
     parts = shapely.get_parts(SQUARE - shapely.union_all([box(x, y, x + w, y + h) for x, y, w, h in zones]))
     water = MultiPolygon([part for part in parts if isinstance(part, Polygon)])

@@ -37,7 +37,7 @@ def contours(simplified) -> np.ndarray:
     return shapely.get_rings(shapely.get_parts(np.array(simplified.parts, dtype=object)))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(lakes, tolerances)
 def test_no_contour_crosses_itself_or_another(lake, tolerance_m):
     simplified = simplify([lake], tolerance_m)
@@ -47,7 +47,7 @@ def test_no_contour_crosses_itself_or_another(lake, tolerance_m):
     assert not any(shapely.crosses(ring, rings).any() for ring in rings)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(lakes, st.sampled_from([0.0, 0.01, 0.5, 4.0]))
 def test_contours_stay_within_the_tolerance_both_ways(lake, tolerance_m):
     simplified = simplify([lake], tolerance_m)

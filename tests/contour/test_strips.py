@@ -21,7 +21,7 @@ rings = st.builds(ragged_ring, st.integers(0, 2**32 - 1), st.integers(3, 300), s
 tolerances = st.sampled_from([0.0, 1e-9, 0.01, 0.5, 3.0, 40.0, 1e6])
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(rings, tolerances)
 def test_every_strip_holds_its_points(ring, tolerance_m):
     ends = strip_ends(ring, tolerance_m)
@@ -30,7 +30,7 @@ def test_every_strip_holds_its_points(ring, tolerance_m):
         assert shapely.distance(edge, shapely.points(ring[first : last + 1])).max() <= tolerance_m * (1 + 1e-9)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(rings, tolerances)
 def test_ends_rise_from_the_first_point_to_the_last_and_span_an_area(ring, tolerance_m):
     ends = strip_ends(ring, tolerance_m)
@@ -40,7 +40,7 @@ def test_ends_rise_from_the_first_point_to_the_last_and_span_an_area(ring, toler
     assert shapely.convex_hull(shapely.LineString(ring[ends])).area > 0
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(rings, tolerances)
 def test_deviations_are_distances_to_the_edges(ring, tolerance_m):
     ends = strip_ends(ring, tolerance_m)

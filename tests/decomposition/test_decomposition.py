@@ -21,7 +21,7 @@ from oxbow_decomposition.headings import predicted_cost, scored_headings
 from oxbow_decomposition.service import handle
 from real_lakes import MISSIONS, needs_missions
 
-quick = settings(deadline=None, max_examples=40, derandomize=True)
+quick = settings(max_examples=40)
 
 
 def ragged(seed: int) -> Polygon:

@@ -239,4 +239,4 @@ class Walk(RuleBasedStateMachine):
 
 
 TestWalk = Walk.TestCase
-TestWalk.settings = settings(max_examples=15, stateful_step_count=25, deadline=None, derandomize=True)
+TestWalk.settings = settings(max_examples=15, stateful_step_count=25)

@@ -55,7 +55,7 @@ def test_the_id_is_readable_and_names_the_content() -> None:
     assert submission(id="lake").mission_id == "lake"
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(st.text())
 def test_any_site_name_makes_an_id(site_name: str) -> None:
     mission = msgspec.structs.replace(submission().mission, site_name=site_name)
@@ -79,7 +79,7 @@ parameters = st.builds(
 )
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(parameters)
 def test_parameters_survive_the_way_through_a_selector(given_parameters: SubmissionParameters) -> None:
     pairs = (part.split("=") for part in given_parameters.text.split(";") if part)

@@ -14,8 +14,8 @@ from oxbow.recording import Layer, discard
 from oxbow.testing import nasty_polygons
 from oxbow_path.service import handle
 
-quick = settings(deadline=None, max_examples=8, derandomize=True)
-few = settings(deadline=None, max_examples=3, derandomize=True)
+quick = settings(max_examples=8)
+few = settings(max_examples=3)
 
 
 def require_sound(plan: PathPlan, asked: PathRequest) -> None:

@@ -14,7 +14,7 @@ from oxbow.contracts import WeightedArea
 from oxbow_path.refinement import Guard, Polyline, RefinementStep, Samples, refined, smoothed
 from oxbow_path.refinement.pull import Pull, feet
 
-quick = settings(deadline=None, max_examples=15, derandomize=True)
+quick = settings(max_examples=15)
 
 SQUARE = box(0, 0, 1000, 1000)
 MEANDER = LineString(

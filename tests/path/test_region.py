@@ -18,7 +18,7 @@ from oxbow_path.walk.gaps import reach_gaps
 from oxbow_path.walk.probe import Probe, covered
 from oxbow_path.walk.region import Brush, Walk, dilated, simply_connected
 
-quick = settings(deadline=None, max_examples=12, derandomize=True)
+quick = settings(max_examples=12)
 
 OPEN = box(-20, -20, 120, 120)
 RING = box(0, 0, 100, 100).difference(box(30, 30, 70, 70))

@@ -16,7 +16,7 @@ from oxbow_path.ring.draws import cell_draws, drawn_places
 from oxbow_path.ring.kohonen import Schedule, organised
 from oxbow_path.service import handle
 
-quick = settings(deadline=None, max_examples=12, derandomize=True)
+quick = settings(max_examples=12)
 
 
 @quick

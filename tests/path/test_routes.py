@@ -12,7 +12,7 @@ from shapely import LineString, Point, Polygon, box
 
 from oxbow.route.gate_routes import Routes, taut
 
-quick = settings(deadline=None, max_examples=12, derandomize=True)
+quick = settings(max_examples=12)
 
 COMB = shapely.union_all([box(0, 0, 1000, 100)] + [box(100 * k, 0, 100 * k + 50, 800) for k in range(10)])
 

@@ -25,7 +25,7 @@ from oxbow_path.tour.pyvrp_solver import is_installed, polished
 from oxbow_path.tour.sites import clustered, low_discrepancy, with_gaps
 from oxbow_path.tour.start import Start, first_tour
 
-quick = settings(deadline=None, max_examples=8, derandomize=True)
+quick = settings(max_examples=8)
 
 SQUARE = box(0, 0, 100, 100)
 HORSESHOE = SQUARE.difference(box(20, 0, 80, 90))

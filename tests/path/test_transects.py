@@ -14,7 +14,7 @@ from oxbow_path.transect.pattern import try_transects
 from oxbow_path.transect.transects import place_transects
 from oxbow_path.walk.trial import Pattern
 
-quick = settings(deadline=None, max_examples=12, derandomize=True)
+quick = settings(max_examples=12)
 
 
 @quick

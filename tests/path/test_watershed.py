@@ -33,7 +33,7 @@ from oxbow_path.watershed import (
 )
 from oxbow_path.watershed.contours import contour_tree
 
-quick = settings(deadline=None, max_examples=6, derandomize=True)
+quick = settings(max_examples=6)
 
 
 def dual(mesh: Mesh) -> nx.Graph:
