@@ -155,12 +155,6 @@ def plan(
         report.print_plan(planned, completed.path)
 
 
-def _planners() -> int:
-    import os
-
-    return max(2, os.cpu_count() or 1)
-
-
 @app.command()
 def up(
     listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where the router listens.")] = DEFAULT_ENDPOINT,
@@ -190,7 +184,7 @@ def up(
         endpoint=endpoint(listen, "--listen"),
         home=home_folder(home),
         recordings=recordings_folder(home),
-        replicas={"path": _planners()} | replica_counts(replicas or ()),
+        replicas=replica_counts(replicas or ()),
     )
     with writing(settings.home):
         settings.home.mkdir(parents=True, exist_ok=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
+import os
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -84,8 +85,11 @@ def with_prior(mission: Mission, prior: Path | None) -> Mission:
 
 
 def replica_counts(texts: Iterable[str]) -> dict[str, int]:
-    """How many processes of each stage, each written ``STAGE=N``."""
-    counts = {}
+    """How many processes of each stage, each written ``STAGE=N``.
+
+    Of the path stage, by default, one per processor and two at least: a mission that takes long holds up no other.
+    """
+    counts = {"path": max(2, os.cpu_count() or 1)}
     for text in texts:
         stage, _, count = text.partition("=")
         if not count.isdecimal():
