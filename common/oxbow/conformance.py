@@ -210,9 +210,20 @@ class Shore:
         return Leg(
             unsafe_m=unsafe_m,
             ashore_m=_length_m(outside),
-            least_ashore_m=ashore_m,
+            least_ashore_m=self._least_ashore_m(Point(end.place)),
             most_unsafe_m=direct_m if unsafe_m <= direct_m else direct_m + DETOUR * self._shortest_m(end, path),
         )
+
+    def _least_ashore_m(self, place: Point) -> float:
+        """How far a vehicle is carried over land: from a place ashore straight to the nearest water, whatever its
+        room, and from one in the water, however narrow, not at all.
+        """
+        nearest = self._parts[np.argmin(shapely.distance(self._parts, place))]
+        way = shapely.shortest_line(place, nearest)
+        if way.length <= ROUNDING_M:
+            return 0.0
+        land = shapely.get_parts(way.difference(self.water))
+        return float(shapely.length(land[shapely.distance(land, place) <= ROUNDING_M]).sum())
 
     def _shortest_m(self, end: _End, path: LineString) -> float:
         """The shortest way from a place to open water, looked for beside a leg, in metres.

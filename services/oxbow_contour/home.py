@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -23,9 +24,8 @@ PRECISION = 1e-3
 def home_water(waters: Sequence[Polygon], request: ContourRequest, narrows: BaseGeometry) -> Polygon:
     """The connected water that is planned on.
 
-    It is the nearest to where the first vehicle starts that has room for the safety distance; the largest, where
-    nobody starts. Water without such room is as good as land: a place in it is reached from the nearest water
-    that has.
+    It is the nearest to where the first vehicle starts; the largest, where nobody starts. A vehicle may be carried
+    to the nearest water, and no farther: from water without room for the safety distance no way leads on.
 
     Parameters
     ----------
@@ -41,11 +41,11 @@ def home_water(waters: Sequence[Polygon], request: ContourRequest, narrows: Base
     InvalidMission
         A place lies too far from water that is wide enough, or behind other land; `where` names it as `places[i]`.
     Infeasible
-        A place lies in other water than the first.
+        A place lies in or by other water than the first, or by water without room for the safety distance.
     """
     if not request.places:
         return waters[0]
-    nearest = [_nearest(waters, request, index) for index in range(len(request.places))]
+    nearest = [_nearest(waters, request, index, narrows) for index in range(len(request.places))]
     for index, water in enumerate(nearest):
         _require_no_land_between(water, request, index, narrows)
     home = nearest[0]
@@ -60,22 +60,91 @@ def home_water(waters: Sequence[Polygon], request: ContourRequest, narrows: Base
     return home
 
 
-def _nearest(waters: Sequence[Polygon], request: ContourRequest, index: int) -> Polygon:
-    """The nearest water to a place that has room; without any, the nearest."""
+def _nearest(waters: Sequence[Polygon], request: ContourRequest, index: int, narrows: BaseGeometry) -> Polygon:
+    """The nearest water to a place; of several on whose shore it lies, one that has room.
+
+    Raises
+    ------
+    InvalidMission
+        It is too far away.
+    Infeasible
+        It has no room, and other water has.
+    """
     distance_m = shapely.distance(np.array(waters, dtype=object), Point(request.places[index]))
-    if distance_m.min() > request.shore_tolerance_m:
+    least_m = float(distance_m.min())
+    if least_m > request.shore_tolerance_m:
         raise InvalidMission(
-            f"lies {distance_m.min():.3g} m from water wider than Least_width = {request.least_width_m:g} m;"
+            f"lies {least_m:.3g} m from water wider than Least_width = {request.least_width_m:g} m;"
             f" expected at most Shore_tolerance = {request.shore_tolerance_m:g} m",
             where=f"places[{index}]",
         )
-    nearest_first = np.argsort(distance_m, kind="stable").tolist()
-    near: list[Polygon] = [
-        waters[number] for number in nearest_first if distance_m[number] <= request.shore_tolerance_m
-    ]
+    nearest_first: list[int] = np.argsort(distance_m, kind="stable").tolist()
+    nearest = waters[nearest_first[0]]
     if len(waters) == 1:
-        return near[0]
-    return next((water for water in near if _has_room(water, request.safety_m)), near[0])
+        return nearest
+    roomy = next((number for number in nearest_first if _has_room(waters[number], request.safety_m)), None)
+    if roomy is None:
+        return nearest
+    if distance_m[roomy] > least_m + ON_SHORE_M:
+        raise _in_a_pocket(nearest, waters[roomy], request, index, narrows)
+    return waters[roomy]
+
+
+def _in_a_pocket(
+    pocket: Polygon, roomy: Polygon, request: ContourRequest, index: int, narrows: BaseGeometry
+) -> Infeasible:
+    """The refusal of a place in or by water without room: what parts it from the nearest water that has."""
+    way = shapely.shortest_line(Point(request.places[index]), roomy)
+    distance_m = pocket.distance(Point(request.places[index]))
+    lies = "in" if distance_m <= ON_SHORE_M else f"{distance_m:.3g} m from"
+    barrier = _Barrier.on(way.difference(pocket), request, narrows)
+    return Infeasible(
+        f"lies {lies} water of {pocket.area:.2g} m2 that has no room for Safety = {request.safety_m:g} m, and the"
+        f" straight way to the nearest that has, {way.length:.3g} m, leads over {barrier.described}; expected a"
+        f" place in or by that water{barrier.remedy}",
+        where=f"places[{index}]",
+    )
+
+
+@dataclass(frozen=True)
+class _Barrier:
+    """What a straight way leads over that is no water wide enough: how many metres of each.
+
+    `zones_m` lie in forbidden zones, `land_m` off the outline, `narrows_m` in water that is too narrow.
+    """
+
+    zones_m: float
+    land_m: float
+    narrows_m: float
+    least_width_m: float
+
+    @classmethod
+    def on(cls, way: BaseGeometry, request: ContourRequest, narrows: BaseGeometry) -> _Barrier:
+        """What there is on a way."""
+        afloat = way.intersection(request.outline)
+        return cls(
+            zones_m=afloat.intersection(shapely.union_all(list(request.zones))).length,
+            land_m=way.length - afloat.length,
+            narrows_m=way.intersection(narrows).length,
+            least_width_m=request.least_width_m,
+        )
+
+    @property
+    def described(self) -> str:
+        """All that is longer than rounding."""
+        parts = (
+            (self.zones_m, "forbidden zone"),
+            (self.land_m, "land"),
+            (self.narrows_m, f"water narrower than Least_width = {self.least_width_m:g} m"),
+        )
+        named = [f"{metres:.2g} m of {what}" for metres, what in parts if metres > ROUNDING_M]
+        return " and ".join(named) or "a place where land or forbidden zones meet"
+
+    @property
+    def remedy(self) -> str:
+        """What would help, but for another place."""
+        zones = ", or forbidden zones that leave a way there" if self.zones_m > ROUNDING_M else ""
+        return zones + (", or less for Least_width" if self.narrows_m > ROUNDING_M else "")
 
 
 def _require_no_land_between(water: Polygon, request: ContourRequest, index: int, narrows: BaseGeometry) -> None:
@@ -91,12 +160,15 @@ def _require_no_land_between(water: Polygon, request: ContourRequest, index: int
     """
     way = shapely.shortest_line(Point(request.places[index]), water)
     # A little larger, since the ends of an intersection need not lie on the line.
-    land = shapely.get_parts(way.difference(narrows.intersection(way.envelope.buffer(1.0)).buffer(ROUNDING_M)))
-    behind = land[shapely.distance(land, shapely.get_point(way, 0)) > ROUNDING_M]
-    if shapely.length(behind).sum() > ON_SHORE_M:
+    seams = narrows.intersection(way.envelope.buffer(1.0))
+    land = shapely.get_parts(way.difference(seams.buffer(ROUNDING_M)))
+    behind = shapely.union_all(land[shapely.distance(land, shapely.get_point(way, 0)) > ROUNDING_M])
+    if behind.length > ON_SHORE_M:
+        barrier = _Barrier.on(behind, request, seams)
         raise InvalidMission(
             f"lies {way.length:.3g} m from water wider than Least_width = {request.least_width_m:g} m, and behind"
-            " a forbidden zone or other land; expected a place by that water, or less for Least_width",
+            f" a forbidden zone or other land, {barrier.described}; expected a place by that water, or less for"
+            " Least_width",
             where=f"places[{index}]",
         )
 
@@ -105,4 +177,5 @@ def _has_room(water: Polygon, safety_m: float) -> bool:
     """Whether a circle with the radius of the safety distance fits into a water."""
     if safety_m == 0.0:
         return True
-    return inscribed_radius_m([water], PRECISION * safety_m) > safety_m
+    is_large = water.area > np.pi * safety_m**2
+    return is_large and inscribed_radius_m([water], PRECISION * safety_m) > safety_m

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import shapely
 from msgspec import structs
-from shapely import MultiPolygon, Polygon
+from shapely import MultiPolygon, Polygon, STRtree
 
 from oxbow.contracts import ContourRequest, DroppedPart, FreeSpace
 from oxbow.errors import Infeasible
@@ -71,11 +71,18 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
 def _opened(water: MultiPolygon, request: ContourRequest) -> MultiPolygon:
     """The water without narrows; as it is, where they part nothing and the safety distance leaves them out."""
     opened = without_narrows(water, request.least_width_m)
-    if 2 * request.safety_m < request.least_width_m or len(opened.geoms) != len(water.geoms):
+    if 2 * request.safety_m < request.least_width_m or not _are_one_of_each(opened, water):
         return opened
     places = shapely.points(np.reshape(request.places, (-1, 2)))
     in_narrows = shapely.distance(places, opened) > shapely.distance(places, water) + ON_SHORE_M
     return opened if in_narrows.any() else without_narrows(water, 0.0)
+
+
+def _are_one_of_each(opened: MultiPolygon, water: MultiPolygon) -> bool:
+    """Whether narrows neither part nor make up any of the waters."""
+    inside = shapely.point_on_surface(shapely.get_parts(opened))
+    _, holder = STRtree(shapely.get_parts(water)).query(inside, predicate="intersects")
+    return len(inside) == len(np.unique(holder)) == len(water.geoms)
 
 
 def _free_space(home: Polygon, request: ContourRequest, area_m2: float) -> Eroded:

@@ -159,6 +159,30 @@ def test_the_water_of_a_leg_is_that_where_it_ends_though_other_water_is_as_near(
     assert not found.faults
 
 
+POCKET = LAKE.difference(box(0, 90, 14, 110)) | box(0, 91, 13, 109)
+
+
+@pytest.mark.parametrize(
+    ("x", "over_land_m"), [(5.0, 1.0), (13.3, 0.7), (-2.0, 3.0)], ids=["in it", "in its rim", "ashore"]
+)
+@pytest.mark.parametrize("end", ["launch", "recovery"])
+def test_no_pocket_makes_the_way_over_its_rim_necessary(x, over_land_m, end):
+    path = [(x, 100.0), (50.0, 100.0), (50.0, 150.0)]
+    found = conduct(path if end == "launch" else path[::-1], POCKET)
+    (fault,) = found.faults
+    assert (fault.rule, fault.leg) == (Rule.OUTSIDE, end)
+    necessary_m = max(0.0, -x, x - 13.0)
+    assert fault.metres == pytest.approx(over_land_m - necessary_m, abs=0.05)
+
+
+def test_a_launch_in_a_seam_makes_no_way_over_land_necessary():
+    behind = LAKE.difference(box(0.02, 90, 14, 110))
+    path = LineString([(0.01, 100.0), (50.0, 100.0), (50.0, 150.0)])
+    (fault,) = Shore(behind, SAFETY_M, 0.1).conduct(path, path.coords[0], path.coords[-1]).faults
+    assert (fault.rule, fault.leg) == (Rule.OUTSIDE, "launch")
+    assert fault.metres == pytest.approx(13.97, abs=0.05)
+
+
 def test_a_creek_as_wide_as_twice_the_safety_distance_does_not_lose_the_other_leg():
     """The way there is as good as safe, and of no basin; the other place lies at the creek's blind end."""
     creek = [(410, 100), (380, 100), (380, 20), (20, 20), (20, 120), (385, 120), (385, 100.05), (699, 100.05)]

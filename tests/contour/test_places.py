@@ -37,15 +37,59 @@ def test_without_a_launch_the_largest_water_is_planned_on():
     assert space(zones=[WALL]).water.bounds[0] == 42
 
 
-def test_water_without_room_for_the_safety_distance_is_as_good_as_land():
-    pocket = box(0, 47, 10, 54) - box(1, 48, 9, 53)
-    assert isinstance(pocket, Polygon)
-    (island,) = [Polygon(pocket.exterior)]
-    ring = [box(1, 47, 9, 48), box(1, 53, 9, 54), box(8, 48, 9, 53), box(0, 47, 1, 48), box(0, 53, 1, 54)]
-    for place in ((-1.0, 50.0), (4.0, 50.0)):
-        found = space(place, zones=ring)
-        assert found.water.area > 9_000
-        assert not found.water.contains(island.centroid)
+ROUND_A_POCKET = Polygon([(-1, 47), (9, 47), (9, 54), (-1, 54), (-1, 53), (8, 53), (8, 48), (-1, 48)])
+TOUCHING = [Polygon([(-1, 46), (8, 50), (8, 46)]), Polygon([(-1, 54), (8, 50), (8, 54)])]
+
+
+def with_mouth(width_m):
+    return list(shapely.get_parts(ROUND_A_POCKET - box(7, 50, 10, 50 + width_m)))
+
+
+@pytest.mark.parametrize(
+    ("place", "zones", "barrier"),
+    [
+        (
+            (6.5, 50.04),
+            [ROUND_A_POCKET],
+            r"in water of 40 m2 .* Safety = 4 m, .* 2.5 m, leads over 1 m of forbidden zone",
+        ),
+        ((8.4, 50.0), [ROUND_A_POCKET], r"0.4 m from water of 40 m2 .* 0.6 m, leads over 0.6 m of forbidden zone"),
+        ((-1.0, 50.0), [ROUND_A_POCKET], r"1 m from water of 40 m2 .* leads over .* m of land"),
+        ((7.0, 50.0), TOUCHING, r"in water of 28 m2 .* leads over a place where land or forbidden zones meet"),
+        (
+            (6.5, 50.04),
+            with_mouth(0.08),
+            r"in water of 40 m2 .* leads over 0.89 m of water narrower than Least_width = 0.1",
+        ),
+        ((5.0, 49.0), with_mouth(0.08), r"in water of 40 m2 .* leads over 1 m of forbidden zone"),
+    ],
+    ids=["in it", "in its rim", "ashore", "touching zones", "mouth", "beside the mouth"],
+)
+def test_no_way_leads_from_water_without_room_for_the_safety_distance(place, zones, barrier):
+    for places in ((place,), ((60.0, 50.0), place)):
+        with pytest.raises(Infeasible, match=rf"places\[{len(places) - 1}\]: lies {barrier}.*; expected a place"):
+            space(*places, zones=zones, least_width_m=0.1)
+
+
+def test_a_pocket_with_a_mouth_wide_enough_is_left_by_it():
+    for place in ((4.0, 50.0), (-0.5, 52.0)):
+        assert space(place, zones=with_mouth(0.12), least_width_m=0.1).water.area > 9_900
+
+
+def test_other_seams_do_not_make_a_narrow_mouth_water():
+    """They are as many waters as the mouth parts."""
+    seam = Polygon([(20, -1), (80, -1), (80, 2), (20, 2)]) - box(25, -2, 75, 0.02)
+    with pytest.raises(Infeasible, match=r"narrower than Least_width"):
+        space((6.0, 50.04), zones=[*with_mouth(0.08), seam], least_width_m=0.1)
+
+
+def test_of_waters_that_meet_at_the_place_the_one_with_room_is_planned_on():
+    assert space((8.0, 50.0), zones=TOUCHING, least_width_m=0.0).water.area > 9_900
+
+
+def test_without_room_anywhere_the_safety_distance_is_named():
+    with pytest.raises(Infeasible, match=r"Safety: is 60 m, which leaves no free water"):
+        space((4.0, 50.0), zones=[ROUND_A_POCKET], safety_m=60.0)
 
 
 @pytest.mark.parametrize(

@@ -148,6 +148,48 @@ def test_a_wide_spot_of_a_creek_is_passed():
     require_sound(planned(mission(creek, (-30.5, 20.0))))
 
 
+ROUND_A_POCKET = Polygon([(-1, 16), (5, 16), (5, 24), (-1, 24), (-1, 23), (4, 23), (4, 17), (-1, 17)])
+IN_THE_POCKET = (2.5, 20.0)
+
+
+@pytest.mark.parametrize("method", [Method.TRANSECT, Method.WATERSHED])
+@pytest.mark.parametrize(
+    ("launch", "where", "fields"),
+    [
+        (IN_THE_POCKET, "LaunchPoint", {}),
+        ((30.0, 20.0), "RecoveryPoint", {"recovery": IN_THE_POCKET}),
+        (
+            (30.0, 20.0),
+            r"Vehicles\[1\]\.Start",
+            {"Vehicles": [MASTERS[0], MASTERS[1] | {"Start": at(*IN_THE_POCKET)}]},
+        ),
+    ],
+    ids=["launch", "recovery", "fleet"],
+)
+def test_a_pocket_that_a_zone_cuts_off_is_infeasible(launch, where, fields, method):
+    with pytest.raises(
+        Infeasible, match=rf"{where}: lies in water of 24 m2 .* over 1 m of forbidden zone; expected"
+    ):
+        planned(mission(LAKE, launch, zones=[ROUND_A_POCKET], **fields), method)
+
+
+POND = LAKE | box(-6, 18, -1, 22) | box(-1.01, 20, 0.01, 20.02)
+
+
+@pytest.mark.parametrize("place", [(-3.0, 20.01), (-3.0, 21.5), (-0.8, 21.0)], ids=["mouth", "beside", "bank"])
+def test_a_pond_beside_the_lake_is_infeasible(place):
+    with pytest.raises(Infeasible, match=r"LaunchPoint: lies .* water of 20 m2 that has no room .* leads over"):
+        planned(mission(POND, place))
+    require_sound(planned(mission(POND, (-0.2, 21.0))))
+
+
+@pytest.mark.parametrize("method", [Method.SPACE_FILLING_CURVE, Method.TOUR])
+def test_out_of_a_pocket_by_its_mouth(method):
+    for mouth in (box(3, 19.8, 6, 20.2), box(3, 22, 6, 22.3)):
+        zones = shapely.get_parts(ROUND_A_POCKET - mouth).tolist()
+        require_sound(planned(mission(LAKE, IN_THE_POCKET, zones=zones), method))
+
+
 WALL = [box(20, -1, 21, 41)]
 
 
