@@ -43,7 +43,7 @@ def triangulated(faces: BaseGeometry | Geometries) -> tuple[FloatArray, Indices]
     -------
     points : ndarray, shape (n, 2)
     triangles : ndarray of int, shape (m, 3)
-        None has its corners in line.
+        None has its corners in line, but where points are one but for rounding.
     """
     points, index = np.unique(_corners(faces).reshape(-1, 2), axis=0, return_inverse=True)
     return points, _without_flats(points, index.reshape(-1, 3))
@@ -76,11 +76,15 @@ def twins_of(triangles: Indices) -> Indices:
 
 def paired(tails: Indices, heads: Indices) -> tuple[Indices, Indices]:
     """Which sides run between the same two points: indices of the one and of the other."""
-    low, high = np.minimum(tails, heads), np.maximum(tails, heads)
-    key = low * (high.max(initial=0) + 1) + high
+    key = _keys(tails, heads, max(tails.max(initial=0), heads.max(initial=0)) + 1)
     order = np.argsort(key, kind="stable")
     same = np.flatnonzero(key[order[1:]] == key[order[:-1]])
     return order[same], order[same + 1]
+
+
+def _keys(tails: Indices, heads: Indices, count: int) -> Indices:
+    """One number for each side between two of so many points, whichever way it runs."""
+    return np.asarray(np.minimum(tails, heads) * count + np.maximum(tails, heads))
 
 
 def following(sides: Indices) -> Indices:
@@ -140,26 +144,32 @@ def _without_flats(points: FloatArray, triangles: Indices) -> Indices:
 
     A flat triangle's longest side is flipped, longer ones before their neighbours: so flips do not undo one
     another. One with a longest side on the border has no area to lose. A needle, two corners of which are one but
-    for rounding, has two such sides, and none to flip.
+    for rounding, has two such sides, and none to flip. Near needles stay flat whichever side is flipped, and
+    rounding decides which of their sides is the longest: what has been flipped away does not come back, lest two
+    of them flip one side to and fro.
     """
     rounding_m = ROUNDING * float(np.abs(points).max(initial=0.0))
-    for _ in range(len(triangles)):
+    gone = np.empty(0, dtype=np.intp)
+    while True:
         twins, lengths = twins_of(triangles), side_lengths(points[triangles])
         longest = lengths.max(axis=1, keepdims=True)
         flat = doubled_areas(points[triangles]) <= rounding_m * longest[:, 0]
         at_border = (twins.reshape(-1, 3) < 0) & (lengths >= longest - 2 * rounding_m)
         lost = flat & at_border.any(axis=1)
-        caps = np.flatnonzero(flat & (lengths.min(axis=1) > 2 * rounding_m))
         if lost.any():
             triangles = triangles[~lost]
-        elif len(caps):
-            caps = caps[np.argsort(-longest[caps, 0], kind="stable")]
-            sides = 3 * caps + np.argmax(lengths[caps], axis=1)
-            sides = sides[_first_claims(caps, twins[sides] // 3)]
-            triangles = flipped(triangles, sides, twins[sides])
-        else:
-            break
-    return triangles
+            continue
+        caps = np.flatnonzero(flat & (lengths.min(axis=1) > 2 * rounding_m))
+        caps = caps[np.argsort(-longest[caps, 0], kind="stable")]
+        sides = 3 * caps + np.argmax(lengths[caps], axis=1)
+        after = _keys(apexes(triangles, sides), apexes(triangles, twins[sides]), len(points))
+        sides = sides[~np.isin(after, gone)]
+        if len(sides) == 0:
+            return triangles
+        sides = sides[_first_claims(sides // 3, twins[sides] // 3)]
+        before = _keys(triangles.ravel()[sides], triangles.ravel()[following(sides)], len(points))
+        gone = np.append(gone, before)
+        triangles = flipped(triangles, sides, twins[sides])
 
 
 def _first_claims(triangles: Indices, neighbours: Indices) -> Mask:

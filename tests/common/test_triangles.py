@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from path_requests import lake
 from scipy.stats import qmc
-from shapely import affinity, box
+from shapely import Polygon, affinity, box
 
+from oxbow import triangles as module
 from oxbow.testing import nasty_polygons
 from oxbow.triangles import (
     angles_rad,
@@ -37,6 +38,49 @@ def test_nasty_shapes_are_tiled_by_triangles_with_a_height(name, turn_deg):
     assert doubled_areas(corners).sum() / 2 == pytest.approx(area.area)
     assert (doubled_areas(corners) > 1e-14 * side_lengths(corners).max(axis=1)).all()
     assert side_lengths(corners).ravel()[twins_of(triangles) < 0].sum() == pytest.approx(area.length)
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 17.3, 45.0])
+@pytest.mark.parametrize("bow_m", [-1e-13, 0.0, 1e-13])
+def test_straight_banks_of_many_places_are_tiled(turn_deg, bow_m):
+    along = np.linspace(0.0, 1000.0, 400)
+    bank = np.column_stack([along, bow_m * np.sin(along / 1000.0 * np.pi)])
+    island = box(400.0, 4.0, 600.0, 6.0)
+    channel = Polygon(np.vstack([bank, bank[::-1] + np.array([0.0, 10.0])])).difference(island)
+    channel = affinity.rotate(affinity.translate(channel, 300.0, 200.0), turn_deg)
+    points, triangles = triangulated(channel)
+    assert doubled_areas(points[triangles]).sum() / 2 == pytest.approx(channel.area)
+    assert (doubled_areas(points[triangles]) > 1e-6).all()
+
+
+@settings(deadline=None, max_examples=100, derandomize=True)
+@given(seed=st.integers(0, 10_000), gap_m=st.floats(2e-13, 2e-12))
+def test_places_that_are_nearly_one_are_triangulated_in_few_rounds(seed, gap_m):
+    area = with_doubled_places(shapely.segmentize(lake(seed, vertices=8, radius_m=100.0), 5.0), seed, gap_m)
+    with pytest.MonkeyPatch.context() as patch:
+        rounds = []
+        patch.setattr(module, "flipped", lambda *sides: rounds.append(sides) or flipped(*sides))
+        points, triangles = triangulated(area)
+    assert len(rounds) <= 20
+    corners = points[triangles]
+    assert doubled_areas(corners).sum() / 2 == pytest.approx(area.area)
+    flat = doubled_areas(corners) <= 1e-14 * side_lengths(corners).max(axis=1)
+    assert (side_lengths(corners[flat]).min(axis=1) < 1e-10).all()
+
+
+def with_doubled_places(area: Polygon, seed: int, gap_m: float) -> Polygon:
+    """The area with a few places of its border followed by up to three more, a gap apart and in line."""
+    rng = np.random.default_rng(seed)
+    rings = []
+    for ring in (area.exterior, *area.interiors):
+        places = shapely.get_coordinates(ring)[:-1]
+        step = np.roll(places, -1, axis=0) - places
+        step *= gap_m / np.hypot(*step.T)[:, None]
+        more = np.where(rng.random(len(places)) < 0.2, rng.integers(1, 4, len(places)), 0)
+        owner = np.repeat(np.arange(len(places)), 1 + more)
+        number = np.arange(len(owner)) - np.searchsorted(owner, owner)
+        rings.append(places[owner] + number[:, None] * step[owner])
+    return Polygon(rings[0], rings[1:])
 
 
 @quick
