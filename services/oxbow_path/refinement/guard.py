@@ -180,6 +180,8 @@ def _ends(segment: Mask) -> Mask:
 
 def _folded(path: Polyline, cosine: float) -> Mask:
     """At which inner nodes (n - 2,) the turn's cosine is less."""
-    edge = np.diff(path.nodes, axis=0)
+    # By axis: sums over pairs take several times as long as sums of two arrays.
+    x, y = np.diff(path.nodes, axis=0).T.copy()
     product = path.lengths_m[:-1] * path.lengths_m[1:]
-    return np.asarray((edge[:-1] * edge[1:]).sum(axis=1) < cosine * np.maximum(product, np.finfo(float).tiny))
+    along = x[:-1] * x[1:] + y[:-1] * y[1:]
+    return np.asarray(along < cosine * np.maximum(product, np.finfo(float).tiny))

@@ -46,9 +46,14 @@ def may_meet(path: Polyline, asked: Indices, reach_m: FloatArray, most_m: float)
     is_asked[asked] = True
     near = _within(middle, radius_m, is_asked[owner])
     pairs = np.sort(owner[near], axis=0)
-    if len(owner) > len(pieces):
-        pairs = np.stack(np.divmod(np.unique(pairs[0] * len(pieces) + pairs[1]), len(pieces)))
-    return beyond(path, pairs, 1)
+    return _distinct(beyond(path, pairs, 1)) if len(owner) > len(pieces) else beyond(path, pairs, 1)
+
+
+def _distinct(pairs: Indices) -> Indices:
+    """Pairs (2, m) of numbers, each once. Sorting takes a fraction of the time of numpy's table for `unique`."""
+    count = pairs.max(initial=0) + 1
+    key = np.sort(pairs[0] * count + pairs[1])
+    return np.stack(np.divmod(key[np.append(True, key[1:] != key[:-1])[: len(key)]], count))
 
 
 def _within(points: FloatArray, radius_m: FloatArray, asked: Mask) -> Indices:
