@@ -12,6 +12,8 @@ from shapely import LineString, Point, Polygon, box
 
 from oxbow.contracts import WeightedArea
 from oxbow_path.refinement import Guard, Polyline, RefinementStep, Samples, refined, smoothed
+from oxbow_path.refinement import guard as guard_module
+from oxbow_path.refinement.nearness import nearer
 from oxbow_path.refinement.pull import Pull, feet
 
 quick = settings(max_examples=15)
@@ -112,9 +114,14 @@ def test_legs_outside_the_free_space_stay():
     assert (moved.nodes[~path.pinned] == path.nodes[~path.pinned] + np.array([0.0, 50.0])).all()
 
 
+SHARP = LineString(
+    [(50, 50), (50, 900), (900, 900), (950, 60), (701, 100), (700, 400), (700, 100), (400, 50), (50, 50)]
+)
+"""Closed, simple, inside the square, and out and back on nearly one line."""
+
+
 def test_one_sharp_place_does_not_hold_the_rest():
-    needle = [(700, 100), (700, 400), (701, 100), (950, 50)]
-    line = LineString([(50, 50), (50, 900), (900, 900), (950, 60), *needle[::-1][1:], (400, 50), (50, 50)])
+    line = SHARP
     assert line.is_simple
     path = Polyline.of(line, SQUARE.buffer(1e-6)).divided(60.0)
     guard = Guard(SQUARE.buffer(1e-6), 5.0, 250.0)
@@ -126,6 +133,18 @@ def test_one_sharp_place_does_not_hold_the_rest():
     refined_path = refine(line, SQUARE, 1.3 * line.length)
     assert conforms(refined_path, SQUARE)
     assert refined_path.length >= 1.2 * line.length
+
+
+@pytest.mark.parametrize("spacing_m", [250.0, 30.0])
+def test_a_sharp_place_is_excused_before_all_shares_are_tried_in_vain(spacing_m, monkeypatch):
+    path = Polyline.of(SHARP, SQUARE.buffer(1e-6)).divided(60.0)
+    guard = Guard(SQUARE.buffer(1e-6), 5.0, spacing_m)
+    checks = []
+    monkeypatch.setattr(guard_module, "nearer", lambda *of: checks.append(of) or nearer(*of))
+    target = path.nodes + np.where(path.nodes[:, :1] < 300, 20.0, 0.0)
+    moved = guard.moved(path, target)
+    assert (moved.nodes[1:-1] == target[1:-1]).all()
+    assert len(checks) < guard_module.ROUNDS
 
 
 def test_stretches_keep_their_distance():

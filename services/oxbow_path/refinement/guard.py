@@ -122,7 +122,8 @@ class Guard:
     def moved(self, path: Polyline, target: FloatArray) -> Polyline:
         """The path with its nodes as far on the way to `target` (n, 2) as keeps it inside and simple.
 
-        What is too near or too sharp in the path as it is must not hold all the rest: it is excused.
+        What is too near or too sharp in the path as it is must not hold all the rest: it is excused as soon as
+        a segment is at fault that does not move, and in a second attempt from the start.
         """
         moved = self._moved(path, target, None)
         if moved is None:
@@ -145,8 +146,14 @@ class Guard:
             if turn >= LOCAL_ROUNDS:
                 blamed[1:] |= blamed[:-1]
                 blamed[:-1] |= blamed[1:]
+            is_held = (fault & ~_of_any(share > 0.0)).any()
             share[blamed] = share[blamed] / 2 if turn < HALVINGS else 0.0
-            suspect = blamed[:-1] | blamed[1:]
+            if is_held and excused is None:
+                # A second attempt would find the same, and take as long.
+                excused = self.faults(path, known=known)
+                blamed |= _ends(excused)
+                share[_ends(excused)] = 0.5**HALVINGS
+            suspect = _of_any(blamed)
         return None
 
     def thinned(self, path: Polyline, drop: Mask) -> Polyline:
@@ -176,6 +183,11 @@ class Guard:
 def _ends(segment: Mask) -> Mask:
     """The nodes (n,) of the chosen segments (n - 1,)."""
     return np.asarray(np.append(segment, False) | np.append(False, segment))
+
+
+def _of_any(node: Mask) -> Mask:
+    """The segments (n - 1,) of which either end is chosen (n,)."""
+    return np.asarray(node[:-1] | node[1:])
 
 
 def _folded(path: Polyline, cosine: float) -> Mask:
