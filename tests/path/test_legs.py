@@ -135,3 +135,23 @@ def test_a_leg_reaches_a_ring_that_is_farther_away_than_its_entry():
     launch = islet.exterior.coords[1]
     plan = handle(request(water, launch=launch, spacings=2.8, safety=0.0035), discard)
     assert plan.path.is_simple
+
+
+CAGE = box(400, 200, 600, 400) - box(420, 220, 580, 380) - box(480, 380, 520, 400)
+"""An island with a harbour, whose mouth looks on the island before it."""
+
+
+@pytest.mark.parametrize("launch", [(500.0, 300.0), (500.0, 215.0)], ids=["afloat", "on the shore"])
+@pytest.mark.parametrize(
+    "recovery", [(500.0, 300.0), (450.0, 330.0), (200.0, 300.0), (900.0, 300.0), (500.0, 215.0)]
+)
+def test_a_place_out_of_sight_of_the_ring_is_led_to_it_past_what_stands_between(launch, recovery):
+    islands = CAGE | box(380, 420, 620, 440)
+    free = FREE - islands
+    routes = Routes(free | box(480, 210, 520, 220), 50.0)
+    legs = [access(place, free, routes, where="LaunchPoint") for place in (launch, recovery)]
+    path = joined(REGION, *legs, Passable(free), opening_m=5.0, detail_m=50.0)
+    assert path.is_simple
+    assert (path.coords[0], path.coords[-1]) == (launch, recovery)
+    assert path.difference(free.buffer(1e-6)).length <= sum(leg.line.length for leg in legs) + 1.0
+    assert REGION.exterior.difference(path.buffer(1e-6)).length < 40

@@ -207,8 +207,9 @@ def joined(
     lengths = [OPENING * leg.line.length for leg in (launch, recovery) if leg.line.length > ROUNDING_M]
     opening_m = min([opening_m, region.exterior.length / 8, *lengths])
     allowed = launch.beside.union(recovery.beside)
+    out = _led_to_ring(region, launch, recovery, passable, detail_m)
     for _ in range(HALVINGS):
-        for path in _candidates(region, launch, recovery, passable, opening_m, detail_m):
+        for path in _candidates(region, out, recovery, passable, opening_m, detail_m):
             if is_plainly_simple(path) and _are_legs(passable.outside(path), allowed, launch, recovery):
                 return path
         # Another detail makes another triangulation, whose way may keep clear of what this one touched.
@@ -263,8 +264,24 @@ def _on(ring: LinearRing, access: Access) -> bool:
     return bool(shapely.dwithin(access.entry, ring, ROUNDING_M))
 
 
+def _led_to_ring(region: Polygon, launch: Access, recovery: Access, passable: Passable, detail_m: float) -> Access:
+    """A leg, led on through the region where none of its ring is in sight, as from an islet amid others.
+
+    It keeps off the recovery point, which is reached from the other end of the ring.
+    """
+    ring, sight = LineString(region.exterior), passable.free_and_rounding
+    at = ring.interpolate(_meeting(ring, launch.entry, sight))
+    if shapely.covers(sight, LineString([launch.entry, at])):
+        return launch
+    inside = largest(region.intersection(passable.free))
+    if launch.place != recovery.place:
+        inside = largest(inside.difference(recovery.entry.buffer(HAIR_M)))
+    way = Routes(inside, detail_m).between(launch.leg[-1], shapely.get_coordinates(at)[0])
+    return replace(launch, leg=np.vstack([launch.leg[:-1], way]) if launch.line.length > 0 else way)
+
+
 def _meeting(ring: LineString, entry: Point, free: BaseGeometry) -> float:
-    """Where along the ring a leg meets it: at the nearest place that is in sight."""
+    """Where along the ring a leg meets it: at the nearest place that is in sight, or else at the nearest."""
     places = np.vstack(
         [shapely.get_coordinates(ring.interpolate(ring.project(entry))), shapely.get_coordinates(ring)]
     )
@@ -352,7 +369,7 @@ def _open(
     line = LineString(inside.exterior)
     sight = inside.buffer(ROUNDING_M)
     start, end = (_meeting(line, leg.entry, sight) for leg in (launch, recovery))
-    inner_leg = LineString([launch.entry, line.interpolate(start)])
+    inner_leg = LineString([*launch.leg, *line.interpolate(start).coords])
     through = Routes(_without(inside, inner_leg, opening_m / 16), detail_m)
     if not _on(inside.exterior, recovery):
         ring = _part(line, start, start - opening_m)
