@@ -1,14 +1,17 @@
 """The region whose rim is walked: its cuts, its enclosed islands, and the gaps that it reaches."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from path_requests import lake, request
-from shapely import Point, Polygon, box
+from shapely import LineString, Point, Polygon, box
 
 from oxbow.recording import discard
+from oxbow.route.gate_routes import Routes
 from oxbow.testing import nasty_polygons
 from oxbow_path.service import handle
 from oxbow_path.task import prepared_waters
@@ -87,3 +90,20 @@ def test_a_ring_in_narrow_water_that_all_but_touches_itself_is_smoothed_by_less(
     """Twice as wide as the moat, the first smoothings leave nothing of it."""
     plan = handle(request(nasty_polygons()["ring"], spacings=8.0), discard)
     assert plan.path.is_simple
+
+
+def test_branches_in_a_folded_canal_take_memory_by_its_length_and_not_by_pairs():
+    """A branch of many steps passes many gaps, each near to steps of several folds."""
+    folds = [(2.0 * k, 100.0 * (side % 2)) for k in range(12) for side in (k, k + 1)]
+    canal = LineString(folds).buffer(0.5, cap_style="flat", join_style="mitre")
+    probe, routes = Probe.over(canal, 0.4), Routes(canal, 1.0)
+    brush = Brush(canal, half_width_m=0.6, margin_m=0.1)
+    start = Walk(canal.intersection(box(-1, -1, 0.6, 5)))
+    tracemalloc.start()
+    try:
+        walk = reach_gaps(start, brush, probe, routes, reach_m=4.0, cut_width_m=0.2)
+        _, most_bytes = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert probe.distances(walk.ring).max() <= 4.0
+    assert most_bytes < 400 * len(probe.points)
