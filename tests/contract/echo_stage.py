@@ -67,6 +67,8 @@ class EchoRequest(Message, frozen=True, kw_only=True):
     shape: Polygon
     path: str = ""
     """A file: the marker of `DIE_ONCE`; else every request handled appends its text to it."""
+    begun: str = ""
+    """A file that is made as the work begins."""
 
 
 class Echo(Message, frozen=True, kw_only=True):
@@ -103,6 +105,8 @@ RAISED: dict[Deed, BaseException] = {
 
 
 def handle(request: EchoRequest, show: Show) -> Echo:
+    if request.begun:
+        open(request.begun, "w").close()  # noqa: PTH123
     time.sleep(request.seconds)
     if request.deed in RAISED:
         raise RAISED[request.deed]

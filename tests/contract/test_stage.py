@@ -95,12 +95,11 @@ def test_a_request_whose_deadline_passed_in_the_queue_is_not_started(
     start_replicas: StartReplicas, bus: Bus, tmp_path: Path
 ) -> None:
     start_replicas()
-    log = str(tmp_path / "handled")
+    log, begun = str(tmp_path / "handled"), tmp_path / "begun"
+    slow = EchoRequest(text="first", shape=SQUARE, seconds=1.0, path=log, begun=str(begun))
     with ThreadPoolExecutor(2) as pool:
-        first = pool.submit(
-            bus.call, ECHO, EchoRequest(text="first", shape=SQUARE, seconds=1.0, path=log), envelope()
-        )
-        time.sleep(0.2)
+        first = pool.submit(bus.call, ECHO, slow, envelope())
+        wait_until(begun.exists)
         with pytest.raises(DeadlineExceeded):
             bus.call(ECHO, EchoRequest(text="late", shape=SQUARE, path=log), envelope(0.2))
         first.result()
@@ -241,13 +240,14 @@ def test_a_key_that_is_none_is_answered_by_those_that_are(start_replicas: StartR
 
 
 def test_another_request_under_an_id_that_is_taken_gets_no_answer_of_it(
-    start_replicas: StartReplicas, bus: Bus
+    start_replicas: StartReplicas, bus: Bus, tmp_path: Path
 ) -> None:
     start_replicas()
-    same = envelope()
+    same, begun = envelope(), tmp_path / "begun"
+    slow = EchoRequest(text="first", shape=SQUARE, seconds=0.5, begun=str(begun))
     with ThreadPoolExecutor(1) as pool:
-        first = pool.submit(ask, bus, EchoRequest(text="first", shape=SQUARE, seconds=0.5), same)
-        time.sleep(0.2)
+        first = pool.submit(ask, bus, slow, same)
+        wait_until(begun.exists)
         while_at_work = ask(bus, EchoRequest(text="second", shape=SQUARE), same)
         assert isinstance(first.result(), bytes)
     afterwards = ask(bus, EchoRequest(text="third", shape=SQUARE), same)
@@ -300,13 +300,13 @@ def test_an_option_that_cannot_be_is_refused_by_name(
 
 
 def test_the_worker_ends_with_its_session_process_even_in_the_middle_of_work(
-    start_replicas: StartReplicas, bus: Bus
+    start_replicas: StartReplicas, bus: Bus, tmp_path: Path
 ) -> None:
     [replica] = start_replicas()
-    worker = psutil.Process(replica.pid).children()[0].pid
+    worker, begun = psutil.Process(replica.pid).children()[0].pid, tmp_path / "begun"
     with ThreadPoolExecutor(1) as pool:
-        lost = pool.submit(ask, bus, EchoRequest(shape=SQUARE, seconds=60.0), envelope())
-        time.sleep(0.2)
+        lost = pool.submit(ask, bus, EchoRequest(shape=SQUARE, seconds=60.0, begun=str(begun)), envelope())
+        wait_until(begun.exists)
         replica.kill()
         assert isinstance(lost.result(), Unavailable)
     wait_gone(worker)
