@@ -11,6 +11,7 @@ from path_requests import lake
 from shapely import LineString, Point, Polygon, box
 
 from oxbow.contracts import WeightedArea
+from oxbow.tolerances import ROUNDING_M
 from oxbow_path.refinement import Guard, Polyline, RefinementStep, Samples, refined, smoothed
 from oxbow_path.refinement import guard as guard_module
 from oxbow_path.refinement.nearness import nearer
@@ -145,6 +146,17 @@ def test_a_sharp_place_is_excused_before_all_shares_are_tried_in_vain(spacing_m,
     moved = guard.moved(path, target)
     assert (moved.nodes[1:-1] == target[1:-1]).all()
     assert len(checks) < guard_module.ROUNDS
+
+
+@pytest.mark.parametrize("apart_m", [40.0, 1e-7])
+def test_a_bend_does_not_close_to_where_rounding_could_cross_it(apart_m):
+    bend = [(500, 900), (500, 300), (500 + apart_m, 300), (600, 900)]
+    line = LineString([(50, 50), (50, 900), *bend, (950, 900), (950, 50), (50, 50)])
+    path = Polyline.of(line, SQUARE.buffer(1e-6))
+    target = path.nodes.copy()
+    target[4, 0] = 500.0 + 1e-9
+    moved = Guard.of(SQUARE, path, 300.0).moved(path, target)
+    assert LineString(moved.nodes[2:4]).distance(LineString(moved.nodes[4:6])) >= min(ROUNDING_M, apart_m / 2)
 
 
 def test_stretches_keep_their_distance():

@@ -62,10 +62,15 @@ class Guard:
     free: BaseGeometry
     clearance_m: float
     spacing_m: float
+    touching_m: float = ROUNDING_M
 
     @classmethod
     def of(cls, free: Polygon, path: Polyline, spacing_m: float) -> Guard:
-        """Guard a path; one whose stretches began nearer than the usual clearance may stay half as near."""
+        """Guard a path; one whose stretches began nearer than the usual clearance may stay half as near.
+
+        So may one that began nearer than rounding, which alone could make a crossing of it: from the mission's
+        plane to degrees and back, say.
+        """
         grown = free.buffer(ROUNDING_M)
         shapely.prepare(grown)
         usual_m = CLEARANCE * spacing_m
@@ -73,7 +78,8 @@ class Guard:
         pairs = may_meet(path, every, np.full(len(every), usual_m / 2), spacing_m)
         near = beyond(path, pairs[:, ~path.legs[pairs].any(axis=0)], NEIGHBOURS)
         gap_m = least_gap_m(path, near)
-        return cls(grown, gap_m / 2 if gap_m < usual_m else usual_m, spacing_m)
+        clearance_m = gap_m / 2 if gap_m < usual_m else usual_m
+        return cls(grown, clearance_m, spacing_m, min(ROUNDING_M, least_gap_m(path, pairs) / 2))
 
     @cached_property
     def _inside(self) -> Inside:
@@ -98,7 +104,7 @@ class Guard:
         afloat = asked[~path.legs[asked]]
         fault[afloat] = self._inside.leaving(path, afloat, known.clear_m)
         pairs = known.pairs if suspect is None else known.pairs[:, suspect[known.pairs].any(axis=0)]
-        near, meets = nearer(path, pairs, self.clearance_m)
+        near, meets = nearer(path, pairs, self.clearance_m, self.touching_m)
         # Neighbours but one, and legs, which begin side by side, may come near, but not meet.
         may_be_near = ~meets & ((steps_between(path, near) <= NEIGHBOURS) | excused[near].any(axis=0))
         fault[near[:, ~may_be_near]] = True

@@ -72,15 +72,18 @@ def _within(points: FloatArray, radius_m: FloatArray, asked: Mask) -> Indices:
     return np.asarray(pairs[:, apart_m <= radius_m[pairs].sum(axis=0)])
 
 
-def nearer(path: Polyline, pairs: Indices, clearance_m: float) -> tuple[Indices, Mask]:
-    """Those of some pairs (2, m) of segments that are no farther apart than a distance, and which of them meet."""
+def nearer(path: Polyline, pairs: Indices, clearance_m: float, touching_m: float) -> tuple[Indices, Mask]:
+    """The pairs (2, m) of segments that are no farther apart than the clearance, and which of them touch.
+
+    Two touch that are no farther apart than `touching_m`.
+    """
     middle = (path.nodes[1:] + path.nodes[:-1]) / 2
     reach_m = path.lengths_m[pairs].sum(axis=0) / 2 + clearance_m + ROUNDING_M
     pairs = pairs[:, np.hypot(*(middle[pairs[0]] - middle[pairs[1]]).T) <= reach_m]
     pairs = pairs[:, _gaps_m(path.nodes, pairs) <= clearance_m + ROUNDING_M]
     first, second = (shapely.linestrings(path.nodes[np.stack([one, one + 1], axis=1)]) for one in pairs)
     near = np.asarray(shapely.dwithin(first, second, clearance_m))
-    return pairs[:, near], np.asarray(shapely.intersects(first[near], second[near]))
+    return pairs[:, near], np.asarray(shapely.dwithin(first[near], second[near], touching_m))
 
 
 def least_gap_m(path: Polyline, pairs: Indices) -> float:
