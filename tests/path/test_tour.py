@@ -18,12 +18,14 @@ from oxbow.testing import nasty_polygons
 from oxbow_path.task import Task
 from oxbow_path.tour.geodesic import Shore
 from oxbow_path.tour.local_search import shortened
-from oxbow_path.tour.outline import _slit, enclosed
+from oxbow_path.tour.outline import enclosed
 from oxbow_path.tour.planner import TourPlan, plan_tour
 from oxbow_path.tour.pruning import pruned
 from oxbow_path.tour.pyvrp_solver import is_installed, polished
 from oxbow_path.tour.sites import clustered, low_discrepancy, with_gaps
+from oxbow_path.tour.slits import slit, slit_in_turn
 from oxbow_path.tour.start import Start, first_tour
+from oxbow_path.walk.region import largest
 
 quick = settings(max_examples=8)
 
@@ -229,12 +231,47 @@ def test_the_outline_of_any_tour_is_one_ring_near_all_its_places(way, places):
 
 def test_slits_that_part_a_region_are_left_out_and_no_others():
     across, into = ([box(x, -1, x + 1, top) for x in range(5, 95, 10)] for top in (101, 50))
-    alone = _slit(SQUARE, np.array(into))
+    alone = slit(SQUARE, np.array(into))
     assert alone.area == pytest.approx(100 * 100 - 50 * len(into))
-    both = _slit(SQUARE, np.array([*across, *into]))
+    both = slit(SQUARE, np.array([*across, *into]))
     assert both.area == pytest.approx(alone.area)
     halves = np.array([half for x in range(5, 95, 10) for half in (box(x, -1, x + 1, 51), box(x, 49, x + 1, 101))])
-    assert _slit(SQUARE, halves).area == pytest.approx(100 * 100 - 51 * (len(halves) // 2))
+    assert slit(SQUARE, halves).area == pytest.approx(100 * 100 - 51 * (len(halves) // 2))
+
+
+def slit_by_differences(region: Polygon, slits: np.ndarray) -> Polygon:
+    """The same by a difference of the whole region for every test."""
+    rest = region.difference(shapely.union_all(slits))
+    areas = shapely.area(shapely.get_parts(rest))
+    if areas.size and areas.sum() - areas.max() <= 1e-12 < areas.max():
+        return largest(rest)
+    half = len(slits) // 2
+    return region if half == 0 else slit_by_differences(slit_by_differences(region, slits[:half]), slits[half:])
+
+
+@settings(max_examples=40)
+@given(seed=st.integers(0, 10_000), count=st.integers(1, 60), squares=st.booleans())
+def test_slits_that_part_a_region_are_found_by_what_they_touch(seed, count, squares):
+    rng = np.random.default_rng(seed)
+    holes = [box(x, y, x + 2, y + 2) for x in range(2, 20, 6) for y in range(2, 20, 6) if rng.random() < 0.6]
+    region = box(0, 0, 20, 20).difference(shapely.union_all(holes))
+    if squares:  # whose sides and corners meet
+        x, y, width, height = rng.integers([-1, -1, 1, 1], [20, 20, 7, 6], (count, 4)).T
+        slits = shapely.box(x, y, x + width, y + height)
+    else:  # some of them rings
+        ends = rng.uniform(-1, 21, (count, 1, 2)) + np.cumsum(rng.normal(0, 2.0, (count, 4, 2)), axis=1)
+        lines = shapely.linestrings(np.where(rng.random((count, 1, 1)) < 0.2, ends[:, [0, 1, 2, 0]], ends))
+        slits = shapely.buffer(lines, 0.2, quad_segs=2)
+    found = slit_in_turn(region, slits)
+    assert found.is_valid
+    assert found.symmetric_difference(slit_by_differences(region, slits)).area <= 1e-4
+
+
+def test_a_slit_round_an_island_is_slit_and_one_that_leaves_nothing_is_not():
+    islet, moat = box(50, 50, 51, 51), box(40, 40, 60, 60)
+    lake_with_islet = SQUARE.difference(islet)
+    found = slit_in_turn(lake_with_islet, np.array([box(-1, -1, 101, 101), moat]))
+    assert found.equals(SQUARE.difference(moat))
 
 
 @quick

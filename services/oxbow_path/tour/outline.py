@@ -11,8 +11,6 @@ construction.
 
 from __future__ import annotations
 
-from typing import TypeGuard
-
 import numpy as np
 import shapely
 from shapely import LineString, Point, Polygon, STRtree
@@ -21,15 +19,13 @@ from shapely.geometry.base import BaseGeometry
 from oxbow.arrays import Geometries, Mask
 from oxbow.contracts import FloatArray
 from oxbow.tolerances import ROUNDING_M
+from oxbow_path.tour.slits import GRID_M, slit
 from oxbow_path.walk.region import largest
 
 __all__ = ["enclosed"]
 
 QUAD_SEGS = 2
 """Lanes have ends of few corners: every corner is a waypoint."""
-
-GRID_M = 1e-7
-"""A tour that comes nearer to itself than this touches itself."""
 
 PARTING = 3
 """Where so many stretches of a tour end, it meets itself."""
@@ -59,7 +55,7 @@ def enclosed(way: FloatArray, free: Polygon, lane_m: float) -> Polygon:
     added = shapely.buffer([*twice[~inside], *_meetings(stretches)], lane_m, quad_segs=QUAD_SEGS)
     region = largest(region.union(shapely.union_all(added).intersection(free)))
     region = largest(region.union(_moats(region, free, lane_m)))
-    return _slit(region, shapely.buffer(twice[inside], lane_m, quad_segs=QUAD_SEGS))
+    return slit(region, shapely.buffer(twice[inside], lane_m, quad_segs=QUAD_SEGS))
 
 
 def _moats(region: Polygon, free: Polygon, width_m: float) -> BaseGeometry:
@@ -72,57 +68,6 @@ def _moats(region: Polygon, free: Polygon, width_m: float) -> BaseGeometry:
     touching = enclosed_ones[shapely.dwithin(enclosed_ones, region.exterior, ROUNDING_M)]
     water = shapely.union_all(shapely.buffer(touching, width_m, quad_segs=QUAD_SEGS)).intersection(free)
     return shapely.union_all([water, *touching])
-
-
-def _slit(region: Polygon, slits: Geometries) -> Polygon:
-    """The region less the slits that do not part it."""
-    if len(slits) == 0:
-        return region
-    rest = region.difference(shapely.union_all(slits))
-    if _is_whole(rest):
-        return rest
-    # Slits that together part it, but for those that join the parts again.
-    joining = _joining(shapely.get_parts(rest), slits)
-    rest = region.difference(shapely.union_all(slits[~joining]))
-    if _is_whole(rest):
-        return rest
-    # What still parts it lies about the lesser parts: all else is slit at once.
-    parts = shapely.get_parts(rest)
-    parting = _touching(slits, np.delete(parts, np.argmax(shapely.area(parts))))
-    parting = _touching(slits, slits[parting])
-    rest = region.difference(shapely.union_all(slits[~joining & ~parting]))
-    return _slit_by_halves(rest, slits[parting]) if _is_whole(rest) else _slit_by_halves(region, slits)
-
-
-def _touching(slits: Geometries, areas: Geometries) -> Mask:
-    touching = np.zeros(len(slits), dtype=bool)
-    touching[STRtree(slits).query(areas, predicate="dwithin", distance=ROUNDING_M)[1]] = True
-    return touching
-
-
-def _is_whole(rest: BaseGeometry) -> TypeGuard[Polygon]:
-    return isinstance(rest, Polygon) and not rest.is_empty
-
-
-def _joining(parts: Geometries, slits: Geometries) -> Mask:
-    """Fewest slits that join all parts that they touch: chosen from the last to the first (Kruskal 1956)."""
-    slit, part = STRtree(parts).query(slits, predicate="dwithin", distance=ROUNDING_M)
-    joined, joining = np.arange(len(parts)), np.zeros(len(slits), dtype=bool)
-    for number in np.unique(slit)[::-1]:
-        together = np.unique(joined[part[slit == number]])
-        if len(together) > 1:
-            joining[number] = True
-            joined[np.isin(joined, together)] = together[0]
-    return joining
-
-
-def _slit_by_halves(region: Polygon, slits: Geometries) -> Polygon:
-    """The same where slits overlap so much that one alone joins nothing: one half of them after the other."""
-    rest = region.difference(shapely.union_all(slits))
-    if _is_whole(rest):
-        return rest
-    half = len(slits) // 2
-    return region if half == 0 else _slit_by_halves(_slit_by_halves(region, slits[:half]), slits[half:])
 
 
 def _is_odd(faces: Geometries, way: FloatArray) -> Mask:
