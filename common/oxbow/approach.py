@@ -44,7 +44,7 @@ from it as the second: in a corner of the free space, where they part is outside
 FAR = 0.25
 """Legs that take more than this share of a range are told: they are missing where the vehicle surveys."""
 SPARE = 1.001
-"""Legs are so many times as long as their middle lines, at most, but for the ends."""
+"""Legs are no more than so many times as long as was computed: where they bend, they are drawn in steps."""
 
 
 @dataclass(frozen=True)
@@ -95,11 +95,20 @@ class Approach:
             " nearer, or give it more length",
         )
 
-    @property
+    @cached_property
     def _legs_m(self) -> float:
-        """How long the legs may become."""
-        legs = [leg for leg in (self.out, self.home) if leg is not None]
-        return sum(SPARE * LineString(leg.points).length + 6.0 * self.apart_m for leg in legs)
+        """How long the legs may become, with the steps from and to the gate.
+
+        On either side, as far from their middle lines as they may be: nearer to these, they are as long as something
+        in between. A path between two legs is cut by the width of both, which is what the steps are longer by.
+        """
+        if self.out is None or self.home is None:
+            return sum(leg.length_m for leg in (self.out, self.home) if leg is not None)
+        beside_m = (
+            self.out.length_beside_m(side * self.apart_m) + self.home.length_beside_m(-side * self.apart_m)
+            for side in (1.0, -1.0)
+        )
+        return SPARE * max(self.out.length_m + self.home.length_m, *beside_m)
 
     def joined(self, path: LineString) -> LineString:
         """A path in the share, with its legs: from the vehicle's start to its recovery.
@@ -152,6 +161,15 @@ class MiddleLine:
     points: FloatArray
     is_ashore: bool
     entry: int = 0
+
+    @property
+    def length_m(self) -> float:
+        """From the place to the gate."""
+        return LineString(self.points).length
+
+    def length_beside_m(self, apart_m: float) -> float:
+        """That of the leg to the right, and straight on to the gate."""
+        return LineString(np.vstack([self.beside(apart_m), self.points[-1:]])).length
 
     def beside(self, apart_m: float) -> FloatArray:
         """The leg to the right of its middle line, without the gate.
