@@ -99,8 +99,8 @@ class Approach:
     def _legs_m(self) -> float:
         """How long the legs may become, with the steps from and to the gate.
 
-        On either side, as far from their middle lines as they may be: nearer to these, they are as long as something
-        in between. A path between two legs is cut by the width of both, which is what the steps are longer by.
+        On either side, as far from their middle lines as they may be: nearer to these, their length is between.
+        A path between two legs is cut by the width of both, which is what the steps are longer by.
         """
         if self.out is None or self.home is None:
             return sum(leg.length_m for leg in (self.out, self.home) if leg is not None)
@@ -269,12 +269,22 @@ class Harbour:
         return not shapely.dwithin(share, entry, ROUNDING_M)
 
     def _to_gate(self, share: Polygon, place: Place) -> _Way:
-        """The middle line of a leg from a place to a share, in lanes as wide as the water allows."""
+        """The middle line of a leg from a place to a share, in lanes as wide as the water allows.
+
+        Lanes too wide for the water between a place on the shore and a share right beside it begin in the share,
+        and would lead through the path there: narrower ones are taken, where there are any.
+        """
+        last: _Way | None = None
         for lanes in self._lanes:
             line = lanes.to_gate(share, place)
-            if line is not None:
-                return _Way(lanes, line)
-        raise Infeasible("lies in water from which no way leads to the vehicle's share", "LaunchPoint")
+            if line is None:
+                continue
+            last = _Way(lanes, line)
+            if LineString(line).intersection(share).length <= ROUNDING_M:
+                return last
+        if last is None:
+            raise Infeasible("lies in water from which no way leads to the vehicle's share", "LaunchPoint")
+        return last
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import msgspec
-from shapely import Polygon
+from shapely import LineString, Polygon
 
 from oxbow.approach import Approach, Harbour
 from oxbow.completion import completed
@@ -35,6 +35,7 @@ from oxbow.contracts import (
 from oxbow.errors import Infeasible, renamed
 from oxbow.fleet import Member, TeamPlan, VehiclePlan
 from oxbow.mission import Mission, PlanOptions
+from oxbow.reserve import WELL_USED
 from oxbow.site import Site
 from oxbow.spacing import nominal_spacing_m
 from oxbow.verification import CheckedCall, require_faultless, require_fit_to_follow
@@ -199,15 +200,28 @@ def _covered(task: Task, member: Member, approach: Approach, water_m2: float) ->
         length_m = approach.length_m(member.vehicle.length_m)
         decomposition = _decomposed(task, member, approach.space, water_m2, length_m)
         plan = _path(task, member, approach, decomposition, length_m)
+        path = approach.joined(plan.path)
         return VehiclePlan(
             member=member,
-            path=approach.joined(plan.path),
+            path=path,
             heading_rad=decomposition.heading_rad,
             spacing_m=plan.spacing_m,
             area_m2=approach.space.free.area,
             dropped=plan.dropped,
-            warnings=approach.warnings(member.vehicle.length_m) + plan.warnings,
+            warnings=(
+                *approach.warnings(member.vehicle.length_m),
+                *plan.warnings,
+                *_unused(path, plan, member, length_m),
+            ),
         )
+
+
+def _unused(path: LineString, plan: PathPlan, member: Member, length_m: float) -> tuple[str, ...]:
+    """What is to be known of a path that uses its length, while its legs leave much of what was kept for them."""
+    share = path.length / member.vehicle.length_m
+    if share >= WELL_USED or plan.path.length < WELL_USED * length_m:
+        return ()
+    return (f"uses {share:.1%} of its longest length: its legs are shorter than what was kept for them",)
 
 
 def _decomposed(task: Task, member: Member, space: FreeSpace, water_m2: float, length_m: float) -> Decomposition:

@@ -6,10 +6,13 @@ import math
 
 from oxbow.errors import Infeasible
 
-__all__ = ["LENGTH_RESERVE", "too_short"]
+__all__ = ["LENGTH_RESERVE", "WELL_USED", "too_short"]
 
 LENGTH_RESERVE = 0.001
 """Share of a length that no path uses: what the rounding of written positions may add."""
+
+WELL_USED = 0.95
+"""Share of a length below which a plan says why it does not use more (Rendas and Li 2016: 5 %)."""
 
 _STEPS_PER_M = 10
 """Lengths are told in decimetres: in whole metres, 884 m may be too short for 884 m."""

@@ -20,7 +20,7 @@ LEAST_SHARE = 0.1
 """Smaller parts than this share of a square of side `reach_m` are not worth a line, unless they are as long."""
 
 
-SPENT, UNREACHED = "going there is not worth its length", "no way there that was tried is better"
+SPENT, UNREACHED = "the length is spent on other water", "no way there that was tried is better"
 """Why water is left: of a path that uses its length, and of one that does not."""
 
 

@@ -11,6 +11,7 @@ from shapely import LineString
 
 from oxbow.contracts import Method, PathPlan, PathRequest
 from oxbow.recording import Show
+from oxbow.reserve import WELL_USED
 from oxbow_path.conformance import require_conforming
 from oxbow_path.course import best_plan
 from oxbow_path.dropped import dropped_parts
@@ -32,9 +33,6 @@ METHODS: dict[Method, PathMethod] = {
 
 WIDEST = 2.0
 """No plan claims a wider spacing than so many nominal ones: what it leaves farther away is named as dropped."""
-
-ACCEPTED = 0.95
-"""Share of the longest length below which a plan says why it does not use more (report: 5 %)."""
 
 
 def handle(request: PathRequest, show: Show) -> PathPlan:
@@ -60,7 +58,7 @@ def planned(request: PathRequest, stop: Stop, show: Show) -> PathPlan:
             path,
             request.space.free,
             plan.reach_m * claimed_m / plan.spacing_m,
-            is_spent=path.length >= ACCEPTED * request.length_m,
+            is_spent=path.length >= WELL_USED * request.length_m,
         ),
         warnings=tuple(_length_warnings(plan, task)),
     )
@@ -89,7 +87,7 @@ def _from_launch_to_recovery(path: LineString, request: PathRequest) -> LineStri
 def _length_warnings(plan: MethodPlan, task: Task) -> Iterator[str]:
     request = task.request
     share = plan.path.length / request.length_m
-    if share < ACCEPTED:
+    if share < WELL_USED:
         if plan.spacing_m <= request.min_spacing_m:
             reason = f"Minimal_spatial_rate keeps the spacing at {request.min_spacing_m:g} m"
         elif min(plan.spacing_m, task.spacing_m) <= finest_spacing_m(request.space):

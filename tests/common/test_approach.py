@@ -1,6 +1,5 @@
 """Legs to shares: they keep to the free space, run beside one another, and leave the path simple."""
 
-
 import pytest
 import shapely
 from hypothesis import given, settings
@@ -76,6 +75,15 @@ def test_what_legs_take_is_their_length(start, spacing_m):
     taken_m = approach.joined(around).length - around.length
     # What is kept back and not used, the vehicle does not survey with.
     assert taken_m <= kept_m <= taken_m + 0.5 * spacing_m
+
+
+@given(x=st.floats(530, 595), y=st.floats(-10, 20), spacing_m=st.floats(20, 400))
+@quick
+def test_a_leg_from_beside_a_share_does_not_begin_in_it(x, y, spacing_m):
+    before = FREE & box(520, 0, 600, 40)
+    approach = Harbour(SPACE, spacing_m).approach(FREE - before - box(0, 0, 520, 400), vehicle((x, y)))
+    assert approach.out is not None
+    assert (LineString(approach.out.points) & approach.space.free).length < 0.01
 
 
 def test_a_vehicle_at_its_share_has_no_legs():
