@@ -12,13 +12,15 @@ from scipy.sparse.csgraph import dijkstra
 from shapely import LineString, MultiPolygon, Point, Polygon, affinity, box
 
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.route import RouteMethod, make_router
+from oxbow.route import RouteMethod, make_router, visibility
 from oxbow.route.channel import Channel
 from oxbow.route.funnel import funnel_line
 from oxbow.route.incenters import incenters
 from oxbow.route.mesh import Mesh
 from oxbow.route.network import NetworkRouter
+from oxbow.route.sights import sights
 from oxbow.route.tessellation import RINGS, Tessellation, lattice
+from oxbow.route.visibility import VisibilityGraph
 from oxbow.testing import nasty_polygons
 
 ROUNDING_M = 1e-6
@@ -52,6 +54,33 @@ def brute_force(water, points):
     length = np.full((len(places), len(places)), np.inf)
     length[one[seen], other[seen]] = np.hypot(*(places[one] - places[other])[seen].T)
     return dijkstra(length, directed=False, indices=np.arange(len(points)))[:, : len(points)]
+
+
+@quick
+@given(seed=seeds)
+def test_bends_that_look_about_by_and_by_see_what_they_see_at_once(seed):
+    mesh = Mesh.of(scene(seed))
+    at_once = VisibilityGraph(mesh).arcs
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(visibility, "EYES", 3)
+        by_and_by = VisibilityGraph(mesh).arcs
+    for array in ("tails", "heads", "costs"):
+        assert np.array_equal(getattr(by_and_by, array), getattr(at_once, array))
+
+
+def test_what_bends_see_along_straight_channels_is_sought_for_some_of_them_at_a_time(monkeypatch):
+    eyes_at_once = []
+
+    def counted(mesh, eyes, at, *rest):
+        eyes_at_once.append(len(np.unique(at.place)))
+        return sights(mesh, eyes, at, *rest)
+
+    monkeypatch.setattr(visibility, "EYES", 10)
+    monkeypatch.setattr(visibility, "sights", counted)
+    graph = VisibilityGraph(Mesh.of(scene(1)))
+    assert len(graph.arcs.tails) > 0
+    assert sum(eyes_at_once) == len(graph.places)
+    assert max(eyes_at_once) <= 10 < len(graph.places)
 
 
 @every_method

@@ -20,7 +20,7 @@ from oxbow.contracts import FloatArray
 from oxbow.route.danger import NO_DANGER, Danger
 from oxbow.route.mesh import Mesh, Touches
 from oxbow.route.network import Ends, Links
-from oxbow.route.search import Arcs
+from oxbow.route.search import Arcs, distinct
 from oxbow.route.sights import IN_LINE, sights
 from oxbow.triangles import cross, following
 
@@ -28,6 +28,10 @@ __all__ = ["VisibilityGraph"]
 
 STRAIGHT_RAD = math.pi - 1e-9
 """A corner of the water at least this wide is one that routes may touch."""
+
+
+EYES = 1024
+"""So many bends look about at once: along straight channels all see so many that it takes memory."""
 
 
 @dataclass(frozen=True)
@@ -60,13 +64,20 @@ class VisibilityGraph:
     @cached_property
     def arcs(self) -> Arcs:
         """See `Network.arcs`: between bends that see each other."""
-        bends = self.bends
-        nobody = np.empty(0, dtype=np.intp)
-        wanted = bends.at_corner >= 0
-        seen = sights(self.mesh, bends.places, bends.touches, np.empty((0, 2)), Touches(nobody, nobody), wanted)
-        a, b = seen.corner_eyes, bends.at_corner[seen.corners]
+        count = len(self.places)
+        pairs = [self._pairs(first, first + EYES) for first in range(0, count, EYES)]
+        return Arcs.both_ways(self.places, np.vstack([np.empty((0, 2), dtype=np.intp), *pairs]), self.danger)
+
+    def _pairs(self, first: int, last: int) -> Indices:
+        """Pairs of one of some bends and a bend that it sees, from and to which a route can lead, shape (n, 2)."""
+        bends, nobody = self.bends, np.empty(0, dtype=np.intp)
+        at, wanted = bends.touches, bends.at_corner >= 0
+        looks = (at.place >= first) & (at.place < last)
+        eyes = Touches(at.place[looks], at.triangle[looks])
+        seen = sights(self.mesh, bends.places, eyes, np.empty((0, 2)), Touches(nobody, nobody), wanted)
+        a, b = distinct(seen.corner_eyes, bends.at_corner[seen.corners])
         useful = bends.can_be_reached(bends.places[a], b) & bends.can_be_reached(bends.places[b], a)
-        return Arcs.both_ways(bends.places, np.column_stack([a, b])[useful], self.danger)
+        return np.column_stack([a, b])[useful]
 
     def links(self, ends: Ends) -> Links:
         """See `Network.links`: what ends see.
