@@ -92,6 +92,17 @@ def test_a_ring_in_narrow_water_that_all_but_touches_itself_is_smoothed_by_less(
     assert plan.path.is_simple
 
 
+def test_bands_of_ways_of_many_corners_are_as_plain_as_those_of_few():
+    """A way along a narrow channel turns at every corner of either bank."""
+    channel = box(-10, -0.03, 110, 0.03)
+    across = 0.005 * (-1.0) ** np.arange(2001)
+    way = LineString(np.column_stack([np.linspace(0, 100, 2001), across]))
+    for free in (channel, OPEN):
+        band = Brush(free, half_width_m=3.0, margin_m=2.0).bands([way])
+        assert band.covers(way.intersection(free))
+        assert shapely.get_num_coordinates(band) < 100
+
+
 def test_branches_in_a_folded_canal_take_memory_by_its_length_and_not_by_pairs():
     """A branch of many steps passes many gaps, each near to steps of several folds."""
     folds = [(2.0 * k, 100.0 * (side % 2)) for k in range(12) for side in (k, k + 1)]

@@ -25,6 +25,10 @@ __all__ = ["Brush", "Circuit", "Walk", "clear_of_land", "dilated", "largest", "s
 CORE = 0.5
 """Half width of a band in narrows, as a share of its half width in the open."""
 
+DETAIL = 0.01
+"""How far a line may be off before it is dilated, as a share of the half width: ways along narrow channels have so
+many corners that GEOS would take minutes."""
+
 LEAST_LINE_M = 1e-9
 """Shorter lines have no direction to be dilated across."""
 
@@ -95,7 +99,7 @@ def _dilations(lines: Sequence[LineString], width_m: float, *, flat: bool) -> li
     # GEOS raises the flags of a division by zero where it mitres parallel segments, and then copes with it.
     with np.errstate(divide="ignore", invalid="ignore"):
         dilations = shapely.buffer(
-            directed,
+            shapely.simplify(directed, DETAIL * width_m),
             width_m,
             cap_style="flat" if flat else "square",
             join_style="mitre",
