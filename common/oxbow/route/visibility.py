@@ -30,7 +30,7 @@ STRAIGHT_RAD = math.pi - 1e-9
 """A corner of the water at least this wide is one that routes may touch."""
 
 
-EYES = 1024
+EYES = 2**14
 """So many bends look about at once: along straight channels all see so many that it takes memory."""
 
 
