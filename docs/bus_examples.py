@@ -29,11 +29,11 @@ from oxbow.contracts import (
     SpacingStep,
     Vehicle,
 )
-from oxbow.envelope import Envelope
 from oxbow.errors import ErrorCode, ErrorReply
-from oxbow.introspection import Info, Ping, Stats, Supervised, Supervision
-from oxbow.recording import Layer, Stamped
-from oxbow.submission import SubmissionParameters
+from oxbow.planning.submission import SubmissionParameters
+from oxbow.wire.envelope import Envelope
+from oxbow.wire.introspection import Info, Ping, Stats, Supervised, Supervision
+from oxbow.wire.recording import Layer, Stamped
 
 __all__ = ["EXAMPLES"]
 

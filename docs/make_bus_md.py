@@ -59,12 +59,12 @@ from oxbow.contracts import (
     layer_key,
     live_key,
 )
-from oxbow.envelope import Envelope, StageError
+from oxbow.contracts.ids import MOST_ID_CHARACTERS
 from oxbow.errors import ErrorCode, ErrorReply
-from oxbow.ids import MOST_ID_CHARACTERS
-from oxbow.introspection import Info, Ping, Stats, Supervised, Supervision
-from oxbow.recording import Layer, LayerKind, Stamped
-from oxbow.submission import SubmissionParameters
+from oxbow.planning.submission import SubmissionParameters
+from oxbow.wire.envelope import Envelope, StageError
+from oxbow.wire.introspection import Info, Ping, Stats, Supervised, Supervision
+from oxbow.wire.recording import Layer, LayerKind, Stamped
 
 __all__ = ["bus_md"]
 

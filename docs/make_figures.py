@@ -20,9 +20,9 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import Certificate, CertifyRequest, CriticalKind
-from oxbow.mission import Mission, read_mission
-from oxbow.pipeline import plan_mission
-from oxbow.recording import Layer
+from oxbow.mission.file import Mission, read_mission
+from oxbow.planning.pipeline import plan_mission
+from oxbow.wire.recording import Layer
 from oxbow_certificate.certify import certify
 from oxbow_certificate.distance import PathDistance
 from oxbow_cli.gaps import GAPS, MOST_RADII, draw_gaps

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from shapely import LineString, Polygon, box
 
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray
 
 __all__ = ["SQUARE", "sample_plans"]
 

@@ -9,7 +9,7 @@ import shapely
 from shapely import Polygon, affinity, box
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.contracts import Place
+from oxbow.arrays import Place
 
 __all__ = ["nasty_polygons"]
 

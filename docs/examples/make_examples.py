@@ -14,12 +14,13 @@ import shapely
 from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.contracts import FloatArray, Role, Variogram, VariogramModel
-from oxbow.danger_zones import GivenDangerZone
-from oxbow.frame import Frame, Position
-from oxbow.mission import Bloom, Mission, MissionType, write_mission
-from oxbow.prior import PriorFeature, PriorModel, prior_document
-from oxbow.vehicles import GivenVehicle
+from oxbow.arrays import FloatArray
+from oxbow.contracts import Role, Variogram, VariogramModel
+from oxbow.geometry.frame import Frame, Position
+from oxbow.mission.danger_zones import GivenDangerZone
+from oxbow.mission.file import Bloom, Mission, MissionType, write_mission
+from oxbow.mission.prior import PriorFeature, PriorModel, prior_document
+from oxbow.mission.vehicles import GivenVehicle
 
 FOLDER = Path(__file__).parent
 DECIMALS = 6

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 from msgspec import structs
 
 from oxbow.contracts import Assignment, AssignRequest, Role, Share, Sortie, Vehicle
-from oxbow.recording import Show
-from oxbow.route import Danger
-from oxbow_assignment.campaign import Campaign, plan_campaign
-from oxbow_assignment.sharing import shared
+from oxbow.geometry.route import Danger
+from oxbow.wire.recording import Show
+from oxbow_assignment.shares.sharing import shared
 from oxbow_assignment.show import show_campaign, show_partition, show_shares
-from oxbow_assignment.sorties import Journey
+from oxbow_assignment.treatment.campaign import Campaign, plan_campaign
+from oxbow_assignment.treatment.sorties import Journey
 
 __all__ = ["handle"]
 

@@ -6,10 +6,10 @@ import numpy as np
 from shapely import LineString
 
 from oxbow.contracts import DangerZone, HotSpot, Share, Sortie
-from oxbow.recording import Layer, LayerKind, Show, is_watched
-from oxbow.route import Route, RouteMethod, make_router
-from oxbow_assignment.campaign import Campaign
-from oxbow_assignment.partition import Partition
+from oxbow.geometry.route import Route, RouteMethod, make_router
+from oxbow.wire.recording import Layer, LayerKind, Show, is_watched
+from oxbow_assignment.shares.partition import Partition
+from oxbow_assignment.treatment.campaign import Campaign
 
 __all__ = ["show_campaign", "show_partition", "show_shares"]
 

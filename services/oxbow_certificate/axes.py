@@ -7,7 +7,7 @@ import shapely
 from shapely import LineString, MultiLineString
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray
 
 __all__ = ["Paths", "long_side", "main_direction", "segment_ends", "turned"]
 

@@ -10,10 +10,10 @@ import numpy as np
 import shapely
 from shapely import MultiLineString
 
-from oxbow import codec
-from oxbow.conformance import Conduct, Shore
 from oxbow.contracts import Certificate, CertifyRequest, Conformance, Track
-from oxbow.route import Danger
+from oxbow.geometry.conformance import Conduct, Shore
+from oxbow.geometry.route import Danger
+from oxbow.wire import codec
 from oxbow_certificate.axes import Paths
 from oxbow_certificate.cover import CoverRadius, cover_radius, least_radius
 from oxbow_certificate.discrepancy import discrepancy

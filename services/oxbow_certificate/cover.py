@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from oxbow.contracts import FloatArray, Place
+from oxbow.arrays import FloatArray, Place
 from oxbow.tolerances import ROUNDING_M
 from oxbow_certificate.distance import PathDistance
 from oxbow_certificate.quadtree import Squares

@@ -11,7 +11,7 @@ import shapely
 from scipy.stats import qmc
 from shapely import LineString, MultiPolygon
 
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray
 from oxbow_certificate.axes import Paths, long_side, turned
 
 __all__ = ["Discrepancy", "discrepancy", "unit_square"]

@@ -10,7 +10,7 @@ import shapely
 from scipy.spatial import cKDTree
 from shapely import STRtree
 
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray
 from oxbow_certificate.axes import Paths, main_direction, segment_ends, turned
 
 __all__ = ["DistanceBounds", "PathDistance", "segments_of"]

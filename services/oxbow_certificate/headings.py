@@ -7,8 +7,7 @@ import math
 import numpy as np
 from shapely import LineString
 
-from oxbow.arrays import Indices
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray, Indices
 from oxbow_certificate.axes import Paths, segment_ends
 
 __all__ = ["count_turns", "directional_evenness"]

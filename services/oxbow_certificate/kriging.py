@@ -17,8 +17,8 @@ import shapely
 from scipy.spatial import KDTree
 from shapely import LineString
 
-from oxbow.arrays import Mask
-from oxbow.contracts import FloatArray, Variogram, VariogramModel
+from oxbow.arrays import FloatArray, Mask
+from oxbow.contracts import Variogram, VariogramModel
 from oxbow_certificate.axes import Paths
 
 __all__ = ["KrigingVariance", "correlation", "kriging_variance", "local_variance", "sampled", "sampling_pitch"]

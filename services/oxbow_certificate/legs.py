@@ -11,8 +11,7 @@ import shapely
 from shapely import LineString, STRtree
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.arrays import Indices
-from oxbow.contracts import FloatArray, Place
+from oxbow.arrays import FloatArray, Indices, Place
 from oxbow_certificate.axes import main_direction, turned
 from oxbow_certificate.distance import segments_of
 

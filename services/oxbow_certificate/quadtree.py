@@ -9,8 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.arrays import Mask
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray, Mask
 
 __all__ = ["Squares"]
 

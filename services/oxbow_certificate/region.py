@@ -9,7 +9,7 @@ from shapely import MultiLineString, MultiPolygon, Polygon
 
 from oxbow.contracts import CertifyRequest
 from oxbow.errors import Infeasible
-from oxbow.narrows import without_narrows
+from oxbow.geometry.narrows import without_narrows
 from oxbow_certificate.cover import least_radius
 from oxbow_certificate.erosion import eroded, polygons
 

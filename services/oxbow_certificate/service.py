@@ -5,7 +5,7 @@ from __future__ import annotations
 from shapely import Point
 
 from oxbow.contracts import Certificate, CertifyRequest
-from oxbow.recording import Layer, LayerKind, Show
+from oxbow.wire.recording import Layer, LayerKind, Show
 from oxbow_certificate.certify import Judgement, judge
 
 __all__ = ["handle"]

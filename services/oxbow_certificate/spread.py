@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from shapely import MultiPolygon
 
-from oxbow.contracts import FloatArray
-from oxbow.triangles import spread
+from oxbow.arrays import FloatArray
+from oxbow.geometry.triangles import spread
 from oxbow_certificate.distance import PathDistance
 
 __all__ = ["DistanceSpread", "distance_spread", "even_places"]

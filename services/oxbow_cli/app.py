@@ -118,7 +118,7 @@ def plan(
     - `oxbow plan lake.json --connect tcp/127.0.0.1:7447`: on a stack that `oxbow up` keeps running
     - `oxbow plan lake.json --prior blooms.geojson --time-limit 10`
     """
-    from oxbow.mission import mission_json
+    from oxbow.mission.file import mission_json
     from oxbow_cli import report
     from oxbow_cli.arguments import (
         endpoint,
@@ -173,7 +173,7 @@ def up(
     """
     import logging
 
-    from oxbow.lifetime import Lifetime
+    from oxbow.runtime.lifetime import Lifetime
     from oxbow_cli.arguments import endpoint, replica_counts
     from oxbow_cli.destination import writing
     from oxbow_cli.home import home_folder, recordings_folder
@@ -275,9 +275,9 @@ def import_site(
     """
     from oxbow.contracts import MAX_REQUEST_BYTES
     from oxbow.errors import renamed
-    from oxbow.files import read_bytes
-    from oxbow.geojson import DOCUMENT, mission_from_geojson
-    from oxbow.mission import mission_json
+    from oxbow.mission.file import mission_json
+    from oxbow.mission.files import read_bytes
+    from oxbow.site.geojson import DOCUMENT, mission_from_geojson
     from oxbow_cli.arguments import position
     from oxbow_cli.destination import Destination
     from oxbow_cli.streams import print_utf8

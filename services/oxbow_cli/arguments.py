@@ -16,10 +16,10 @@ import msgspec
 from oxbow.bus import DEFAULT_ENDPOINT
 from oxbow.contracts import MOST_DEADLINE_S, Draw, Method
 from oxbow.errors import InvalidMission, OxbowError, renamed
-from oxbow.frame import Position
-from oxbow.mission import Mission, read_mission
-from oxbow.plan import PlanOptions
-from oxbow.prior_file import read_prior
+from oxbow.geometry.frame import Position
+from oxbow.mission.file import Mission, read_mission
+from oxbow.mission.plan import PlanOptions
+from oxbow.mission.prior_file import read_prior
 
 E = TypeVar("E", bound=enum.StrEnum)
 

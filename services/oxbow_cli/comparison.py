@@ -9,8 +9,8 @@ from typing import Any
 import shapely
 
 from oxbow.contracts import Message
-from oxbow.mission import Mission
-from oxbow.site import Site
+from oxbow.mission.file import Mission
+from oxbow.site.site import Site
 from oxbow_cli.arguments import naming
 from oxbow_cli.evaluation import Evaluation, evaluate
 

@@ -13,7 +13,7 @@ from itertools import count
 from pathlib import Path
 
 from oxbow.errors import InvalidMission
-from oxbow.files import write_atomically
+from oxbow.mission.files import write_atomically
 from oxbow_cli.interrupts import ending
 
 __all__ = ["Destination", "writing"]

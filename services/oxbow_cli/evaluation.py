@@ -13,11 +13,11 @@ from shapely import LineString
 
 from oxbow.contracts import Certificate, CertifyRequest, Conformance, Measures, Role, Track
 from oxbow.errors import InvalidMission, OxbowError
-from oxbow.fleet import Member
-from oxbow.frame import Frame, Position, geodesic_length_m, lonlat
-from oxbow.mission import Mission
-from oxbow.plan import PlanCertificate
-from oxbow.site import Site
+from oxbow.geometry.frame import Frame, Position, geodesic_length_m, lonlat
+from oxbow.mission.file import Mission
+from oxbow.mission.plan import PlanCertificate
+from oxbow.site.fleet import Member
+from oxbow.site.site import Site
 from oxbow_certificate.certify import certify
 
 __all__ = ["Evaluation", "VehicleEvaluation", "certify_request", "evaluate", "named_as_given"]

@@ -19,9 +19,9 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from shapely import MultiPolygon, Polygon
 
-from oxbow.contracts import Place
-from oxbow.mission import Mission
-from oxbow.site import Site
+from oxbow.arrays import Place
+from oxbow.mission.file import Mission
+from oxbow.site.site import Site
 from oxbow_certificate.axes import Paths
 from oxbow_certificate.certify import Judgement, judge
 from oxbow_certificate.distance import PathDistance

@@ -18,10 +18,10 @@ from pathlib import Path
 import msgspec
 
 from oxbow.bus import Session
-from oxbow.closing import Closing
 from oxbow.contracts import any_introspection_key, introspection_key
 from oxbow.errors import OxbowError, Unavailable
-from oxbow.introspection import Ping, Supervised, Supervision
+from oxbow.runtime.closing import Closing
+from oxbow.wire.introspection import Ping, Supervised, Supervision
 from oxbow_cli.supervisor import Child
 
 __all__ = ["Health", "StoppedProcess", "stopped_processes"]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from oxbow.local import Handler, LocalCall
-from oxbow.recording import Show, discard
+from oxbow.stage.local import Handler, LocalCall
+from oxbow.wire.recording import Show, discard
 
 __all__ = ["local_call"]
 

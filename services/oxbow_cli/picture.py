@@ -17,11 +17,11 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from oxbow.contracts import FloatArray
-from oxbow.frame import lonlat
-from oxbow.mission import Mission, MissionType
-from oxbow.plan import PlanRecord, TreatmentRecord
-from oxbow.site import Site
+from oxbow.arrays import FloatArray
+from oxbow.geometry.frame import lonlat
+from oxbow.mission.file import Mission, MissionType
+from oxbow.mission.plan import PlanRecord, TreatmentRecord
+from oxbow.site.site import Site
 from oxbow_cli import sheet
 from oxbow_cli.sheet import GAP, INK
 

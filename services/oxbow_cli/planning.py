@@ -16,10 +16,10 @@ from typing import TypeVar
 from oxbow.client import Client
 from oxbow.contracts import Call, Endpoint, Message, MissionStatus
 from oxbow.errors import DeadlineExceeded
-from oxbow.files import move_into_place
-from oxbow.mission import Mission
-from oxbow.pipeline import expected_calls, plan_mission
-from oxbow.plan import PlanOptions
+from oxbow.mission.file import Mission
+from oxbow.mission.files import move_into_place
+from oxbow.mission.plan import PlanOptions
+from oxbow.planning.pipeline import expected_calls, plan_mission
 from oxbow_cli.exits import DEBUG
 from oxbow_cli.interrupts import ending
 from oxbow_cli.local import local_call

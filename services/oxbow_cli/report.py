@@ -16,11 +16,11 @@ from rich.table import Table
 from rich.text import Text
 
 from oxbow.contracts import Conformance, Measures, Method, MissionState
-from oxbow.frame import Position
+from oxbow.geometry.frame import Position
 from oxbow_cli.streams import print_utf8
 
 if TYPE_CHECKING:
-    from oxbow.plan import PlanRecord
+    from oxbow.mission.plan import PlanRecord
     from oxbow_cli.comparison import Comparison
     from oxbow_cli.evaluation import Evaluation
     from oxbow_cli.planning import Planned, Progress

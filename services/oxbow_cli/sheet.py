@@ -24,10 +24,10 @@ from matplotlib.text import Text
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.contracts import Place
+from oxbow.arrays import Place
 from oxbow.errors import InvalidMission
-from oxbow.files import write_atomically
-from oxbow.site import Site
+from oxbow.mission.files import write_atomically
+from oxbow.site.site import Site
 from oxbow_certificate.erosion import eroded
 from oxbow_cli.interrupts import ending
 

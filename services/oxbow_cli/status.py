@@ -11,7 +11,7 @@ from oxbow.bus import Bus
 from oxbow.client import Client
 from oxbow.contracts import MissionStatus, any_introspection_key
 from oxbow.errors import OxbowError, Unavailable
-from oxbow.introspection import Ping, Stats, Supervised, Supervision
+from oxbow.wire.introspection import Ping, Stats, Supervised, Supervision
 from oxbow_cli.stack import SERVICES
 
 __all__ = ["Process", "StackStatus", "status_of"]

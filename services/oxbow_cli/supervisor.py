@@ -147,7 +147,7 @@ class Supervisor:
     """Runs children until it is closed; a context manager.
 
     Children that should not outlive a supervisor that is killed have to notice its death themselves
-    (`oxbow.lifetime`).
+    (`oxbow.runtime.lifetime`).
     """
 
     def __init__(self, output: int | None = None) -> None:

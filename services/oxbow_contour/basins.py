@@ -8,10 +8,11 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Point, Polygon
 
-from oxbow.contracts import ContourRequest, Place
+from oxbow.arrays import Place
+from oxbow.contracts import ContourRequest
 from oxbow.errors import Infeasible
-from oxbow.narrows import direct_leg_m, is_basin
-from oxbow.route import Routes
+from oxbow.geometry.narrows import direct_leg_m, is_basin
+from oxbow.geometry.route import Routes
 from oxbow.tolerances import ROUNDING_M
 
 __all__ = ["require_reachable"]

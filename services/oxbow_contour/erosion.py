@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray
 from oxbow_contour.rings import GeometryArray, rings_of, runs_of
 
 __all__ = ["erode"]

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray
 
 __all__ = ["GeometryArray", "rings_of", "runs_of"]
 

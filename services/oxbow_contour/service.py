@@ -11,9 +11,9 @@ from shapely import MultiPolygon, Polygon, STRtree
 
 from oxbow.contracts import ContourRequest, DroppedPart, FreeSpace
 from oxbow.errors import Infeasible
-from oxbow.narrows import is_basin, is_thin, without_narrows
-from oxbow.recording import Layer, LayerKind, Show
+from oxbow.geometry.narrows import is_basin, is_thin, without_narrows
 from oxbow.tolerances import ON_SHORE_M
+from oxbow.wire.recording import Layer, LayerKind, Show
 from oxbow_contour.basins import require_reachable
 from oxbow_contour.free_space import EXACT, MANY_POINTS, Eroded, erode_water
 from oxbow_contour.home import home_water

@@ -9,8 +9,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 
-from oxbow.arrays import Indices, Mask
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray, Indices, Mask
 from oxbow_contour.rings import rings_of
 from oxbow_contour.strips import deviations, strip_ends
 

@@ -7,9 +7,8 @@ import math
 
 import numpy as np
 
-from oxbow.arrays import Indices
-from oxbow.contracts import FloatArray
-from oxbow.triangles import cross
+from oxbow.arrays import FloatArray, Indices
+from oxbow.geometry.triangles import cross
 
 __all__ = ["deviations", "strip_ends"]
 

@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from shapely import LinearRing, Polygon
 
-from oxbow.contracts import FloatArray, Place
+from oxbow.arrays import FloatArray, Place
 
 __all__ = ["boundary_walks", "distinct"]
 

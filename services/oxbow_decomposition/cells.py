@@ -9,7 +9,7 @@ import numpy as np
 from shapely import Polygon
 
 from oxbow.contracts import Cell, CriticalKind, CriticalPoint, Decomposition, HeadingScore
-from oxbow.sweep import from_sweep
+from oxbow.geometry.sweep import from_sweep
 from oxbow_decomposition.boundary import boundary_walks
 from oxbow_decomposition.chains import Chain, Extreme, Mark, extremes
 

@@ -15,9 +15,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from oxbow.arrays import Indices, Mask
-from oxbow.contracts import FloatArray
-from oxbow.sweep import to_sweep
+from oxbow.arrays import FloatArray, Indices, Mask
+from oxbow.geometry.sweep import to_sweep
 from oxbow_decomposition.boundary import distinct
 
 __all__ = ["Chain", "Extreme", "Mark", "extremes"]

@@ -8,8 +8,9 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from oxbow.contracts import FloatArray, HeadingScore
-from oxbow.sweep import to_sweep
+from oxbow.arrays import FloatArray
+from oxbow.contracts import HeadingScore
+from oxbow.geometry.sweep import to_sweep
 
 __all__ = ["candidate_headings", "predicted_cost", "scored_headings"]
 

@@ -6,9 +6,9 @@ import shapely
 from shapely import Point
 
 from oxbow.contracts import DecomposeRequest, Decomposition, HeadingScore
-from oxbow.recording import Layer, LayerKind, Show
-from oxbow.reeb import cell_polygon
-from oxbow.sweep import from_sweep
+from oxbow.geometry.reeb import cell_polygon
+from oxbow.geometry.sweep import from_sweep
+from oxbow.wire.recording import Layer, LayerKind, Show
 from oxbow_decomposition.cells import decompose
 from oxbow_decomposition.headings import scored_headings
 

@@ -12,7 +12,7 @@ import platformdirs
 
 from oxbow.bus import DEFAULT_ENDPOINT, Bus
 from oxbow.errors import Internal, OxbowError, Unavailable
-from oxbow.lifetime import Lifetime
+from oxbow.runtime.lifetime import Lifetime
 from oxbow_mission.checks import Checks
 from oxbow_mission.database import Database
 from oxbow_mission.planner import Planner

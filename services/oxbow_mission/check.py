@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
-from oxbow.site import Site
-from oxbow.submission import Submission
+from oxbow.planning.submission import Submission
+from oxbow.site.site import Site
 from oxbow_mission.peer import Peer
 from oxbow_mission.wire import Check, Checked, FromHelper, ToHelper
 

@@ -7,8 +7,8 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 
-from oxbow.closing import Closing
 from oxbow.errors import Busy, DeadlineExceeded, Internal, InvalidMission, OxbowError, described
+from oxbow.runtime.closing import Closing
 from oxbow_mission.fair import FairQueue
 from oxbow_mission.helper import Helper, HelperDied, Helpers
 from oxbow_mission.wire import Answer, Ask, Check, Checked, Failed, Show

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from oxbow.closing import Closing
 from oxbow.errors import Internal, Unavailable
+from oxbow.runtime.closing import Closing
 
 __all__ = ["Database", "Schema"]
 

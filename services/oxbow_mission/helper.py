@@ -14,8 +14,8 @@ from multiprocessing.connection import Connection
 
 import msgspec
 
-from oxbow.closing import Closing
 from oxbow.errors import DeadlineExceeded, Internal, OxbowError
+from oxbow.runtime.closing import Closing
 from oxbow.stage.watch import Verdict, Watch
 from oxbow.stage.worker import ended, is_want_of_memory, needs_memory, one_threaded
 from oxbow_mission.wire import (

@@ -13,10 +13,10 @@ import msgspec
 
 from oxbow.bus import Bus, BusCall
 from oxbow.bus.query import MSGPACK
-from oxbow.closing import Closing
 from oxbow.contracts import STAGES, any_layer_key, layer_key
 from oxbow.errors import DeadlineExceeded, ErrorReply, Internal, OxbowError, Unavailable, described
-from oxbow.submission import SubmissionParameters
+from oxbow.planning.submission import SubmissionParameters
+from oxbow.runtime.closing import Closing
 from oxbow_mission.fair import Turns
 from oxbow_mission.helper import Helper, HelperDied, Helpers
 from oxbow_mission.registry import Registry

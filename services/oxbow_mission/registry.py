@@ -16,9 +16,9 @@ from urllib.parse import quote
 import msgspec
 
 from oxbow.bus import Session
-from oxbow.closing import Closing
 from oxbow.contracts import MissionKey, MissionState, MissionStatus, mission_key
 from oxbow.errors import Cancelled, ErrorReply, Internal, InvalidMission, OxbowError
+from oxbow.runtime.closing import Closing
 from oxbow_mission.fair import Order
 from oxbow_mission.store import Job, Request, Revision, Store
 

@@ -8,14 +8,14 @@ from typing import TypeVar
 import msgspec
 from shapely import Point
 
-from oxbow import codec
 from oxbow.contracts import Endpoint, Message
 from oxbow.errors import Internal, InvalidMission, OxbowError
-from oxbow.mission import mission_json, parse_mission
-from oxbow.pipeline import expected_calls, plan_mission
-from oxbow.recording import Layer, LayerKind, Stamped
-from oxbow.site import Site
-from oxbow.submission import SubmissionParameters
+from oxbow.mission.file import mission_json, parse_mission
+from oxbow.planning.pipeline import expected_calls, plan_mission
+from oxbow.planning.submission import SubmissionParameters
+from oxbow.site.site import Site
+from oxbow.wire import codec
+from oxbow.wire.recording import Layer, LayerKind, Stamped
 from oxbow_mission.peer import Peer
 from oxbow_mission.wire import STAGE, Ask, FromHelper, Plan, Planned, Show, ToHelper
 

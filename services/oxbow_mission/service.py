@@ -12,7 +12,6 @@ import msgspec
 from oxbow.bus import Bus
 from oxbow.bus.mailbox import Mailbox
 from oxbow.bus.query import Query
-from oxbow.closing import Closing
 from oxbow.contracts import (
     ANY,
     MAX_REQUEST_BYTES,
@@ -23,8 +22,9 @@ from oxbow.contracts import (
     live_key,
     mission_key,
 )
+from oxbow.contracts.ids import excerpt
 from oxbow.errors import ErrorReply, Internal, InvalidMission, OxbowError, described
-from oxbow.ids import excerpt
+from oxbow.runtime.closing import Closing
 from oxbow_mission.checks import Checks
 from oxbow_mission.incoming import PutRequest, QueriedPlan, QueriedRequest
 from oxbow_mission.registry import Registry

@@ -14,7 +14,7 @@ import msgspec
 
 from oxbow.bus import Session
 from oxbow.contracts import introspection_key
-from oxbow.introspection import Info, Ping, Stats, rss_bytes
+from oxbow.wire.introspection import Info, Ping, Stats, rss_bytes
 
 __all__ = ["Vitals"]
 

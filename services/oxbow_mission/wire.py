@@ -39,7 +39,7 @@ class Check(msgspec.Struct, frozen=True, kw_only=True, tag=True):
 
 
 class Checked(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """What a request is kept as: see `oxbow.submission.Submission`."""
+    """What a request is kept as: see `oxbow.planning.submission.Submission`."""
 
     mission_id: str
     client: str

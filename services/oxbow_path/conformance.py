@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from shapely import LineString
 
-from oxbow.conformance import strays
 from oxbow.contracts import PathRequest
 from oxbow.errors import Internal
+from oxbow.geometry.conformance import strays
 
 __all__ = ["require_conforming"]
 

@@ -10,13 +10,13 @@ import shapely
 from shapely import LineString
 
 from oxbow.contracts import Method, PathPlan, PathRequest
-from oxbow.recording import Show
-from oxbow.reserve import WELL_USED
+from oxbow.contracts.budget import WELL_USED
+from oxbow.wire.recording import Show
 from oxbow_path.conformance import require_conforming
 from oxbow_path.course import best_plan
 from oxbow_path.dropped import dropped_parts
 from oxbow_path.refinement import Polyline, smoothed
-from oxbow_path.ring import space_filling_curve
+from oxbow_path.space_filling_curve import space_filling_curve
 from oxbow_path.task import Display, MethodPlan, PathMethod, Stop, Task, finest_spacing_m
 from oxbow_path.tour import tour
 from oxbow_path.transect import transects

@@ -13,12 +13,13 @@ import shapely
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.contracts import FloatArray, FreeSpace, PathRequest, SpacingStep, WeightedArea
-from oxbow.recording import Layer, LayerKind, Show
-from oxbow.route import leg_routes
-from oxbow.route.gate_routes import Routes
-from oxbow.spacing import nominal_spacing_m
-from oxbow.sweep import from_sweep, to_sweep
+from oxbow.arrays import FloatArray
+from oxbow.contracts import FreeSpace, PathRequest, SpacingStep, WeightedArea
+from oxbow.contracts.budget import nominal_spacing_m
+from oxbow.geometry.route import leg_routes
+from oxbow.geometry.route.gate_routes import Routes
+from oxbow.geometry.sweep import from_sweep, to_sweep
+from oxbow.wire.recording import Layer, LayerKind, Show
 from oxbow_path.refinement import RefinementStep, Samples
 from oxbow_path.walk.legs import Passable, access
 from oxbow_path.walk.probe import Probe
@@ -94,7 +95,7 @@ class Task:
 
     @property
     def spacing_m(self) -> float:
-        """The nominal spacing (`oxbow.spacing`)."""
+        """The nominal spacing (`oxbow.contracts.budget`)."""
         return self.waters.spacing_m
 
     @property

@@ -15,7 +15,7 @@ import platformdirs
 from oxbow.bus import DEFAULT_ENDPOINT, Session
 from oxbow.contracts import ANY_LAYER, live_key
 from oxbow.errors import InvalidMission
-from oxbow.lifetime import Lifetime
+from oxbow.runtime.lifetime import Lifetime
 from oxbow_recorder.files import sweep
 from oxbow_recorder.live import LiveServer
 from oxbow_recorder.runs import Runs

@@ -40,7 +40,7 @@ class _Name(msgspec.Struct):
 
 
 class _Stamp(msgspec.Struct):
-    """The part of an `oxbow.recording.Stamped` that names it."""
+    """The part of an `oxbow.wire.recording.Stamped` that names it."""
 
     mission_id: str
     layer: _Name
@@ -48,7 +48,7 @@ class _Stamp(msgspec.Struct):
 
 
 def address_of(key: str, payload: bytes) -> Address:
-    """The address of an encoded `oxbow.recording.Stamped` that was put on `key`.
+    """The address of an encoded `oxbow.wire.recording.Stamped` that was put on `key`.
 
     Raises
     ------

@@ -13,9 +13,9 @@ import rerun as rr
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.contracts import FloatArray
-from oxbow.frame import Frame
-from oxbow.recording import Colour, Layer, LayerKind
+from oxbow.arrays import FloatArray
+from oxbow.geometry.frame import Frame
+from oxbow.wire.recording import Colour, Layer, LayerKind
 
 __all__ = ["Drawn", "draw"]
 

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 
-from oxbow.closing import Closing
+from oxbow.runtime.closing import Closing
 
 __all__ = ["LiveServer"]
 

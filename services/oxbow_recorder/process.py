@@ -14,9 +14,9 @@ from pathlib import Path
 
 import msgspec
 
-from oxbow.codec import decode
-from oxbow.lifetime import wake_with_parents_death
-from oxbow.recording import Stamped
+from oxbow.runtime.lifetime import wake_with_parents_death
+from oxbow.wire.codec import decode
+from oxbow.wire.recording import Stamped
 from oxbow_recorder.recordings import Recordings
 from oxbow_recorder.wire import Finish, ToWriter
 

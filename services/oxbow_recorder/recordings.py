@@ -10,8 +10,8 @@ from pathlib import Path
 import rerun as rr
 
 from oxbow.errors import OxbowError, Unavailable
-from oxbow.frame import Frame
-from oxbow.recording import Stamped
+from oxbow.geometry.frame import Frame
+from oxbow.wire.recording import Stamped
 from oxbow_recorder.address import Run
 from oxbow_recorder.blueprint import blueprint
 from oxbow_recorder.drawing import draw

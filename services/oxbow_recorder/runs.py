@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from oxbow.closing import Closing
+from oxbow.runtime.closing import Closing
 from oxbow_recorder.address import Run, address_of
 from oxbow_recorder.files import holds, recording_path
 from oxbow_recorder.vitals import Counts

@@ -9,7 +9,7 @@ import sys
 
 import rerun as rr
 
-from oxbow.lifetime import Lifetime
+from oxbow.runtime.lifetime import Lifetime
 
 __all__ = ["main"]
 

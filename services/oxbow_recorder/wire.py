@@ -10,7 +10,7 @@ __all__ = ["Draw", "Finish", "ToWriter"]
 
 
 class Draw(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """A layer to draw, an encoded `oxbow.recording.Stamped`; the first of a run begins its recording."""
+    """A layer to draw, an encoded `oxbow.wire.recording.Stamped`; the first of a run begins its recording."""
 
     run: Run
     payload: bytes

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from oxbow.contracts import FloatArray, Role, Vehicle
-from oxbow_assignment.assignment import Assignment
-from oxbow_assignment.problem import Objective, Problem
+from oxbow.arrays import FloatArray
+from oxbow.contracts import Role, Vehicle
+from oxbow_assignment.targets.assignment import Assignment
+from oxbow_assignment.targets.problem import Objective, Problem
 
 SIDE_M = 1_000.0
 

@@ -10,13 +10,13 @@ from scenes import problem, random_problem, require_sound, vehicle
 
 from oxbow.contracts import Role, Vehicle
 from oxbow.errors import InvalidMission, Unavailable
-from oxbow_assignment import joint
-from oxbow_assignment.assign import Clustering, ClusterMethod, assign
-from oxbow_assignment.assignment import assignment_of
-from oxbow_assignment.clustering import k_means
-from oxbow_assignment.matching import match
-from oxbow_assignment.problem import Objective, Problem
-from oxbow_assignment.pseudo_coordinates import pseudo_coordinates
+from oxbow_assignment.targets import joint
+from oxbow_assignment.targets.assign import Clustering, ClusterMethod, assign
+from oxbow_assignment.targets.assignment import assignment_of
+from oxbow_assignment.targets.clustering import k_means
+from oxbow_assignment.targets.matching import match
+from oxbow_assignment.targets.problem import Objective, Problem
+from oxbow_assignment.targets.pseudo_coordinates import pseudo_coordinates
 
 quick = settings(max_examples=20)
 seeds = st.integers(0, 10_000)

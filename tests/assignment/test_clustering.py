@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import cdist, pdist, squareform
 
 from oxbow.errors import InvalidMission
-from oxbow_assignment.clustering import cluster_by_radius, faded, fuzzy_c_means, k_means, mean_distances
-from oxbow_assignment.pseudo_coordinates import pseudo_coordinates
+from oxbow_assignment.targets.clustering import cluster_by_radius, faded, fuzzy_c_means, k_means, mean_distances
+from oxbow_assignment.targets.pseudo_coordinates import pseudo_coordinates
 
 quick = settings(max_examples=25)
 seeds = st.integers(0, 10_000)

@@ -10,7 +10,6 @@ from path_requests import lake
 from shapely import Polygon, box
 from waters import blob, hot_spots, require_sound, slave
 
-from oxbow.codec import encode
 from oxbow.contracts import (
     Assignment,
     AssignRequest,
@@ -23,8 +22,9 @@ from oxbow.contracts import (
     Vehicle,
 )
 from oxbow.errors import Infeasible
-from oxbow.recording import Layer, discard
-from oxbow.route import Danger, RouteMethod
+from oxbow.geometry.route import Danger, RouteMethod
+from oxbow.wire.codec import encode
+from oxbow.wire.recording import Layer, discard
 from oxbow_assignment.service import handle
 from oxbow_certificate.certify import certify
 

@@ -8,7 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
-from oxbow_assignment.ordering import EXACT_MOST, best_path, exact_path, improved_path, inserted_path, path_length
+from oxbow_assignment.targets.ordering import (
+    EXACT_MOST,
+    best_path,
+    exact_path,
+    improved_path,
+    inserted_path,
+    path_length,
+)
 
 quick = settings(max_examples=25)
 

@@ -14,12 +14,18 @@ from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import ContourRequest
 from oxbow.errors import InvalidMission
-from oxbow.mesh import Mesh, mesh_area
-from oxbow.mission import read_mission
-from oxbow.recording import discard
-from oxbow.site import Site
+from oxbow.mission.file import read_mission
+from oxbow.site.site import Site
 from oxbow.testing import nasty_polygons
-from oxbow_assignment.partition import BALANCE, Partition, balanced_partition, rebalanced, wavefront_partition
+from oxbow.wire.recording import discard
+from oxbow_assignment.shares.mesh import Mesh, mesh_area
+from oxbow_assignment.shares.partition import (
+    BALANCE,
+    Partition,
+    balanced_partition,
+    rebalanced,
+    wavefront_partition,
+)
 from oxbow_contour.service import handle as contour
 from real_lakes import MISSIONS, needs_missions
 

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from scenes import problem, random_problem, require_sound, vehicle
 
 from oxbow.errors import InvalidMission
-from oxbow_assignment.assign import assign
-from oxbow_assignment.problem import Objective, Problem
-from oxbow_assignment.reassignment import reassign
+from oxbow_assignment.targets.assign import assign
+from oxbow_assignment.targets.problem import Objective, Problem
+from oxbow_assignment.targets.reassignment import reassign
 
 quick = settings(max_examples=20)
 seeds = st.integers(0, 10_000)

@@ -11,17 +11,17 @@ from path_requests import lake
 from shapely import Polygon, box
 from waters import hot_spots, master, require_sound, slave
 
-from oxbow.codec import decode, encode
 from oxbow.contracts import Assignment, AssignRequest, ContourRequest, HotSpot
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.mission import read_mission
-from oxbow.recording import Layer, discard
-from oxbow.route import RouteMethod
-from oxbow.site import Site
+from oxbow.geometry.route import RouteMethod
+from oxbow.mission.file import read_mission
+from oxbow.site.site import Site
 from oxbow.testing import nasty_polygons
-from oxbow_assignment.campaign import plan_campaign
-from oxbow_assignment.partition import BALANCE
+from oxbow.wire.codec import decode, encode
+from oxbow.wire.recording import Layer, discard
 from oxbow_assignment.service import handle
+from oxbow_assignment.shares.partition import BALANCE
+from oxbow_assignment.treatment.campaign import plan_campaign
 from oxbow_contour.service import handle as contour
 from real_lakes import MISSIONS, needs_missions
 

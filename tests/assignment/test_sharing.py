@@ -10,14 +10,15 @@ from path_requests import lake
 from shapely import LineString, Point, Polygon, box
 from waters import master
 
-from oxbow.contracts import Assignment, AssignRequest, FloatArray, Place, Vehicle
+from oxbow.arrays import FloatArray, Place
+from oxbow.contracts import Assignment, AssignRequest, Vehicle
 from oxbow.errors import Infeasible
-from oxbow.recording import discard
-from oxbow.route import Routes, lengths_from, way_to
-from oxbow_assignment.partition import BALANCE
-from oxbow_assignment.reach import SPARE
+from oxbow.geometry.route import Routes, lengths_from, way_to
+from oxbow.wire.recording import discard
 from oxbow_assignment.service import handle
-from oxbow_assignment.sharing import TRIANGLES, shared
+from oxbow_assignment.shares.partition import BALANCE
+from oxbow_assignment.shares.reach import SPARE
+from oxbow_assignment.shares.sharing import TRIANGLES, shared
 
 CANAL = box(0, 0, 5_000, 8)
 WEST, EAST = (0.0, 4.0), (5_000.0, 4.0)

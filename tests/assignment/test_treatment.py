@@ -14,16 +14,16 @@ from waters import blob, covered_share, hot_spots, slave
 
 from oxbow.contracts import HotSpot
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.route import RouteMethod, make_router
+from oxbow.geometry.route import RouteMethod, make_router
 from oxbow.testing import nasty_polygons
-from oxbow_assignment import division
-from oxbow_assignment.campaign import plan_campaign
-from oxbow_assignment.division import divided
-from oxbow_assignment.fleet import Fleet
-from oxbow_assignment.passes import parallel_passes
-from oxbow_assignment.sorties import scheduled
-from oxbow_assignment.spots import waters
-from oxbow_assignment.treatment import COVERED, MOST_PASSES, Treatment, treatment_of
+from oxbow_assignment.treatment import division
+from oxbow_assignment.treatment.campaign import plan_campaign
+from oxbow_assignment.treatment.division import divided
+from oxbow_assignment.treatment.fleet import Fleet
+from oxbow_assignment.treatment.passes import parallel_passes
+from oxbow_assignment.treatment.sorties import scheduled
+from oxbow_assignment.treatment.spots import waters
+from oxbow_assignment.treatment.treatment import COVERED, MOST_PASSES, Treatment, treatment_of
 
 quick = settings(max_examples=10)
 SEA = box(-1_000, -1_000, 1_000, 1_000)

@@ -7,7 +7,8 @@ import pytest
 import shapely
 from shapely import Point, Polygon
 
-from oxbow.contracts import Assignment, AssignRequest, HotSpot, Place, Role, Sortie, Vehicle
+from oxbow.arrays import Place
+from oxbow.contracts import Assignment, AssignRequest, HotSpot, Role, Sortie, Vehicle
 
 ROUNDING_M = 1e-5
 CIRCLES = 1e-3

@@ -14,13 +14,14 @@ from results import Figure, Goal, Section, middle
 from scipy.spatial.distance import cdist
 from shapely import Polygon
 
-from oxbow.contracts import FloatArray, Vehicle
-from oxbow.route import RouteMethod, Router, make_router
-from oxbow.site import Site
-from oxbow_assignment.assign import Clustering, ClusterMethod, assign, cluster_paths
-from oxbow_assignment.assignment import Assignment, assignment_of
-from oxbow_assignment.joint import gap_to, is_available, optimise
-from oxbow_assignment.problem import Objective, Problem
+from oxbow.arrays import FloatArray
+from oxbow.contracts import Vehicle
+from oxbow.geometry.route import RouteMethod, Router, make_router
+from oxbow.site.site import Site
+from oxbow_assignment.targets.assign import Clustering, ClusterMethod, assign, cluster_paths
+from oxbow_assignment.targets.assignment import Assignment, assignment_of
+from oxbow_assignment.targets.joint import gap_to, is_available, optimise
+from oxbow_assignment.targets.problem import Objective, Problem
 
 __all__ = ["measure"]
 

@@ -10,9 +10,9 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from oxbow.contracts import FloatArray
-from oxbow.frame import Frame, Position
-from oxbow.mission import Mission, MissionType
+from oxbow.arrays import FloatArray
+from oxbow.geometry.frame import Frame, Position
+from oxbow.mission.file import Mission, MissionType
 
 __all__ = ["lake", "with_spacings"]
 

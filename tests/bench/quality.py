@@ -13,8 +13,8 @@ from stages import TimedCall
 
 from oxbow.contracts import CERTIFY, CONTOUR, DECOMPOSE, PATH, Method, Role
 from oxbow.errors import OxbowError
-from oxbow.mission import PlanOptions, read_mission
-from oxbow.pipeline import plan_mission
+from oxbow.mission.file import PlanOptions, read_mission
+from oxbow.planning.pipeline import plan_mission
 from oxbow_cli.evaluation import evaluate
 from oxbow_cli.local import local_call
 

@@ -13,9 +13,9 @@ from lakes import lake
 from results import Figure, Goal, Section
 from shapely import Polygon
 
-from oxbow.contracts import FloatArray
-from oxbow.frame import Frame, lonlat
-from oxbow.route import DynamicRouter, RouteMethod, make_router
+from oxbow.arrays import FloatArray
+from oxbow.geometry.frame import Frame, lonlat
+from oxbow.geometry.route import DynamicRouter, RouteMethod, make_router
 
 __all__ = ["measure"]
 

@@ -22,8 +22,8 @@ import oxbow
 from oxbow.bus import Bus, BusCall
 from oxbow.bus.router import free_endpoint
 from oxbow.contracts import ANY, STAGES, MissionKey, MissionState, MissionStatus
-from oxbow.mission import Mission, PlanOptions, write_mission
-from oxbow.pipeline import plan_mission
+from oxbow.mission.file import Mission, PlanOptions, write_mission
+from oxbow.planning.pipeline import plan_mission
 from oxbow_cli.local import local_call
 
 __all__ = ["measure_bus", "measure_connect", "measure_load", "measure_memory", "measure_start"]

@@ -15,8 +15,8 @@ from results import Figure, Section
 
 from oxbow.contracts import STAGES, Call, Endpoint, Message
 from oxbow.errors import OxbowError
-from oxbow.mission import Mission, mission_json, parse_mission
-from oxbow.pipeline import plan_mission
+from oxbow.mission.file import Mission, mission_json, parse_mission
+from oxbow.planning.pipeline import plan_mission
 from oxbow_cli.local import local_call
 
 __all__ = ["TimedCall", "measure"]

@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, MultiPolygon, Point, Polygon, affinity, box
 
-from oxbow.conformance import crossings_of
 from oxbow.contracts import Certificate, CertifyRequest, DangerZone, Per, Track
 from oxbow.errors import Infeasible
-from oxbow.mission import mission_json, read_mission
-from oxbow.pipeline import plan_mission
-from oxbow.plan import PlanOptions
-from oxbow.recording import Layer, discard
+from oxbow.geometry.conformance import crossings_of
+from oxbow.mission.file import mission_json, read_mission
+from oxbow.mission.plan import PlanOptions
+from oxbow.planning.pipeline import plan_mission
 from oxbow.testing import nasty_polygons
+from oxbow.wire.recording import Layer, discard
 from oxbow_certificate.cover import least_radius
 from oxbow_certificate.distance import PathDistance
 from oxbow_certificate.service import handle

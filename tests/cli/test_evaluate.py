@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from oxbow.mission import Mission, parse_mission
+from oxbow.mission.file import Mission, parse_mission
 from oxbow_cli.comparison import compare
 from real_lakes import REFEREE, needs_referee
 

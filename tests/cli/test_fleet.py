@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from oxbow.mission import read_mission
-from oxbow.site import Site
+from oxbow.mission.file import read_mission
+from oxbow.site.site import Site
 from oxbow_cli import sheet
 from oxbow_cli.picture import DANGER
 

@@ -10,10 +10,10 @@ import pytest
 
 from oxbow.contracts import Conformance, Role
 from oxbow.errors import InvalidMission
-from oxbow.mission import mission_json, parse_mission, read_mission
-from oxbow.pipeline import plan_mission
-from oxbow.plan import FleetRecord, PlanOptions, VehicleRecord
-from oxbow.site import Site
+from oxbow.mission.file import mission_json, parse_mission, read_mission
+from oxbow.mission.plan import FleetRecord, PlanOptions, VehicleRecord
+from oxbow.planning.pipeline import plan_mission
+from oxbow.site.site import Site
 from oxbow_cli import sheet
 from oxbow_cli.gaps import draw_gaps
 from oxbow_cli.local import local_call

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from oxbow.mission import read_mission
-from oxbow.site import Site
+from oxbow.mission.file import read_mission
+from oxbow.site.site import Site
 from oxbow_cli.arguments import with_prior
 
 VARIOGRAM = {"model": "exponential", "range_m": 80.0, "sill": 2.0, "nugget": 0.1}

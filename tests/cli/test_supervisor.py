@@ -26,7 +26,7 @@ DEAF = """
     import msgspec
     from oxbow.bus import Session
     from oxbow.contracts import introspection_key
-    from oxbow.introspection import Ping
+    from oxbow.wire.introspection import Ping
 
     deaf, busy = threading.Event(), threading.Event()
     signal.signal(signal.SIGUSR1, lambda *_: deaf.set())

@@ -6,11 +6,11 @@ import numpy as np
 import shapely
 from shapely import Polygon, box
 
-from oxbow.contracts import FloatArray
-from oxbow.route import NO_DANGER, Danger, RouteMethod, Router, make_router
-from oxbow.route.mesh import Mesh
-from oxbow.route.network import NetworkRouter
-from oxbow.route.tessellation import Tessellation
+from oxbow.arrays import FloatArray
+from oxbow.geometry.route import NO_DANGER, Danger, RouteMethod, Router, make_router
+from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.route.network import NetworkRouter
+from oxbow.geometry.route.tessellation import Tessellation
 
 __all__ = ["obstacle", "places_in", "scene", "scene_router"]
 

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon, box
 
-from oxbow.approach import Approach, Harbour
 from oxbow.contracts import FreeSpace, Role, Vehicle
 from oxbow.errors import Infeasible
+from oxbow.planning.approach import Approach, Harbour
 
 LAKE = box(0, 0, 1000, 400) - box(300, 100, 500, 400)
 FREE = LAKE.buffer(-5.0, join_style="mitre")

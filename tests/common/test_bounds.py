@@ -10,9 +10,9 @@ import pytest
 
 from oxbow.contracts import Method
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.mission import Mission, parse_mission
-from oxbow.pipeline import plan_mission
-from oxbow.plan import PlanOptions
+from oxbow.mission.file import Mission, parse_mission
+from oxbow.mission.plan import PlanOptions
+from oxbow.planning.pipeline import plan_mission
 from oxbow_cli.local import local_call
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "docs/mission-file.schema.json").read_text())

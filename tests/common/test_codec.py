@@ -13,7 +13,6 @@ import shapely
 from shapely import LineString, MultiPolygon, Point, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
-from oxbow import codec
 from oxbow.contracts import (
     Cell,
     ContourRequest,
@@ -25,7 +24,8 @@ from oxbow.contracts import (
     PathRequest,
 )
 from oxbow.errors import InvalidMission
-from oxbow.recording import Layer, discard
+from oxbow.wire import codec
+from oxbow.wire.recording import Layer, discard
 from oxbow_decomposition.service import handle as decompose
 
 SQUARE = box(0.0, 0.0, 10.0, 10.0)

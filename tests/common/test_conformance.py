@@ -7,8 +7,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Polygon, affinity, box
 
-from oxbow.conformance import Shore
 from oxbow.contracts import Rule
+from oxbow.geometry.conformance import Shore
 
 LAKE = box(0, 0, 400, 200)
 SAFETY_M = 10.0

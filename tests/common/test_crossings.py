@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Polygon
 
-from oxbow import crossings
-from oxbow.crossings import Edges, TooManyPairs, self_contact
 from oxbow.errors import InvalidMission
-from oxbow.mission import parse_mission
-from oxbow.prior import PriorFeature
-from oxbow.site import Site
+from oxbow.geometry import crossings
+from oxbow.geometry.crossings import Edges, TooManyPairs, self_contact
+from oxbow.mission.file import parse_mission
+from oxbow.mission.prior import PriorFeature
+from oxbow.site.site import Site
 
 rings = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=3, max_size=12).map(
     lambda points: np.array(
@@ -140,7 +140,7 @@ def test_an_outline_that_could_not_be_checked_in_time_is_refused():
 
 
 def test_contours_have_a_limit_of_points(monkeypatch):
-    monkeypatch.setattr("oxbow.contours.MOST_POINTS", 7)
+    monkeypatch.setattr("oxbow.site.contours.MOST_POINTS", 7)
     with pytest.raises(InvalidMission, match="8 points with its zones; expected at most 7"):
         Site.of(mission(SQUARE, SQUARE / 2))
 

@@ -11,8 +11,8 @@ from shapely import box
 
 from oxbow.contracts import DANGER_DETOUR_M, AssignRequest, Per, Vehicle
 from oxbow.errors import InvalidMission
-from oxbow.mission import mission_json, parse_mission
-from oxbow.site import Site
+from oxbow.mission.file import mission_json, parse_mission
+from oxbow.site.site import Site
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "docs/mission-file.schema.json").read_text())
 

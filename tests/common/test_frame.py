@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from oxbow.frame import Frame, geodesic_length_m
+from oxbow.geometry.frame import Frame, geodesic_length_m
 
 
 @settings(max_examples=50)

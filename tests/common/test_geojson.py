@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from oxbow.errors import InvalidMission
-from oxbow.frame import Position
-from oxbow.geojson import ImportedMission, mission_from_geojson
-from oxbow.mission import Mission
-from oxbow.site import Site
+from oxbow.geometry.frame import Position
+from oxbow.mission.file import Mission
+from oxbow.site.geojson import ImportedMission, mission_from_geojson
+from oxbow.site.site import Site
 
 OUTER = [[1.0, 46.0], [1.1, 46.0], [1.1, 46.1], [1.0, 46.1], [1.0, 46.0]]
 HOLE = [[1.04, 46.04], [1.04, 46.06], [1.06, 46.06], [1.06, 46.04], [1.04, 46.04]]

@@ -12,10 +12,10 @@ from path_requests import lake
 from shapely import Polygon, affinity, box
 
 from oxbow.errors import InvalidMission
-from oxbow.mesh import Mesh, mesh_area, propagate
-from oxbow.mesh.refinement import refined
-from oxbow.mesh.triangulation import Triangulation
 from oxbow.testing import nasty_polygons
+from oxbow_assignment.shares.mesh import Mesh, mesh_area, propagate
+from oxbow_assignment.shares.mesh.refinement import refined
+from oxbow_assignment.shares.mesh.triangulation import Triangulation
 
 quick = settings(max_examples=6)
 

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 from oxbow.contracts import MAX_REQUEST_BYTES, Method
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.mission import Mission, mission_json, parse_mission, read_mission, write_mission
-from oxbow.pipeline import plan_mission
-from oxbow.plan import PlanOptions
-from oxbow.site import Site
+from oxbow.mission.file import Mission, mission_json, parse_mission, read_mission, write_mission
+from oxbow.mission.plan import PlanOptions
+from oxbow.planning.pipeline import plan_mission
+from oxbow.site.site import Site
 from oxbow_cli.local import local_call
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "docs/examples").glob("*.json"))

@@ -11,11 +11,11 @@ from shapely import LineString
 
 from oxbow.contracts import ASSIGN, Method, Role
 from oxbow.errors import Infeasible
-from oxbow.frame import lonlat
-from oxbow.mission import MissionType, mission_json, parse_mission
-from oxbow.pipeline import expected_calls, plan_mission
-from oxbow.plan import PlanOptions
-from oxbow.site import Site
+from oxbow.geometry.frame import lonlat
+from oxbow.mission.file import MissionType, mission_json, parse_mission
+from oxbow.mission.plan import PlanOptions
+from oxbow.planning.pipeline import expected_calls, plan_mission
+from oxbow.site.site import Site
 from oxbow_cli.evaluation import evaluate
 from oxbow_cli.local import local_call
 

@@ -13,14 +13,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, MultiPoint, MultiPolygon, Point, Polygon, box
 
-from oxbow.codec import decode, encode
 from oxbow.contracts import Variogram, VariogramModel
 from oxbow.errors import InvalidMission
-from oxbow.mission import mission_json, parse_mission
-from oxbow.pipeline import plan_mission
-from oxbow.plan import PlanOptions
-from oxbow.prior import PriorFeature, PriorModel, parse_prior, prior_document
-from oxbow.site import Site
+from oxbow.mission.file import mission_json, parse_mission
+from oxbow.mission.plan import PlanOptions
+from oxbow.mission.prior import PriorFeature, PriorModel, parse_prior, prior_document
+from oxbow.planning.pipeline import plan_mission
+from oxbow.site.site import Site
+from oxbow.wire.codec import decode, encode
 from oxbow_cli.local import local_call
 
 SQUARE = [(1.0, 46.0), (1.02, 46.0), (1.02, 46.02), (1.0, 46.02)]

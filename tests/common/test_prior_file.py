@@ -12,8 +12,8 @@ from hypothesis.extra import numpy as arrays
 from shapely import MultiPolygon, box
 
 from oxbow.errors import InvalidMission
-from oxbow.prior_file import read_prior
-from oxbow.raster import MAX_CELLS, Raster
+from oxbow.mission.prior_file import read_prior
+from oxbow.mission.raster import MAX_CELLS, Raster
 
 HEADER = "ncols 3\nnrows 2\nxllcorner 1.0\nyllcorner 46.0\ncellsize 0.01\nNODATA_value -1\n"
 GRID = HEADER + "1 2 2\n-1 2 2\n"

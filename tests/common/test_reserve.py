@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from oxbow.reserve import LENGTH_RESERVE, too_short
+from oxbow.contracts.budget import LENGTH_RESERVE, too_short
 
 
 @given(st.floats(0.01, 1e7), st.sampled_from([LENGTH_RESERVE, 0.01]))

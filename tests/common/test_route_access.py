@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from shapely import LineString, MultiPolygon, Point, box
 
 from oxbow.errors import Infeasible
-from oxbow.route import Routes, way_to
+from oxbow.geometry.route import Routes, way_to
 from oxbow.tolerances import ON_SHORE_M
 
 LAKE = box(0, 0, 100, 100)

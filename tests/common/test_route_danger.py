@@ -12,7 +12,7 @@ from shapely import Polygon, box
 
 from oxbow.contracts import DangerZone, Per
 from oxbow.errors import InvalidMission
-from oxbow.route import Danger, RouteMethod, make_router
+from oxbow.geometry.route import Danger, RouteMethod, make_router
 
 quick = settings(max_examples=10)
 every_method = pytest.mark.parametrize("method", RouteMethod)

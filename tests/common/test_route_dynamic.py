@@ -10,9 +10,9 @@ from shapely import Polygon, box
 
 from oxbow.contracts import DangerZone, Per
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.route import Danger, DynamicRouter, RouteMethod, make_router
+from oxbow.geometry.route import Danger, DynamicRouter, RouteMethod, make_router
+from oxbow.geometry.triangles import cross
 from oxbow.testing import nasty_polygons
-from oxbow.triangles import cross
 
 quick = settings(max_examples=12)
 GRID_M = 1e-5

@@ -12,15 +12,15 @@ from scipy.sparse.csgraph import dijkstra
 from shapely import LineString, MultiPolygon, Point, Polygon, affinity, box
 
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.route import RouteMethod, make_router, visibility
-from oxbow.route.channel import Channel
-from oxbow.route.funnel import funnel_line
-from oxbow.route.incenters import incenters
-from oxbow.route.mesh import Mesh
-from oxbow.route.network import NetworkRouter
-from oxbow.route.sights import sights
-from oxbow.route.tessellation import RINGS, Tessellation, lattice
-from oxbow.route.visibility import VisibilityGraph
+from oxbow.geometry.route import RouteMethod, make_router, visibility
+from oxbow.geometry.route.channel import Channel
+from oxbow.geometry.route.funnel import funnel_line
+from oxbow.geometry.route.incenters import incenters
+from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.route.network import NetworkRouter
+from oxbow.geometry.route.sights import sights
+from oxbow.geometry.route.tessellation import RINGS, Tessellation, lattice
+from oxbow.geometry.route.visibility import VisibilityGraph
 from oxbow.testing import nasty_polygons
 
 ROUNDING_M = 1e-6

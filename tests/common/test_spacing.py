@@ -7,8 +7,8 @@ import pytest
 import shapely
 from shapely import Polygon, affinity, box
 
-from oxbow.lattice import lattice_within
-from oxbow.spacing import nominal_spacing_m
+from oxbow.contracts.budget import nominal_spacing_m
+from oxbow.geometry.lattice import lattice_within
 
 
 @pytest.mark.parametrize("turned_deg", [0.0, 17.0, 45.0])

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from oxbow.errors import InvalidMission
-from oxbow.strict_json import decode_json
+from oxbow.wire.strict_json import decode_json
 
 
 class Part(msgspec.Struct):

@@ -11,9 +11,8 @@ from path_requests import lake
 from scipy.stats import qmc
 from shapely import Polygon, affinity, box
 
-from oxbow import triangles as module
-from oxbow.testing import nasty_polygons
-from oxbow.triangles import (
+from oxbow.geometry import triangles as module
+from oxbow.geometry.triangles import (
     angles_rad,
     apexes,
     cross,
@@ -25,6 +24,7 @@ from oxbow.triangles import (
     triangulated,
     twins_of,
 )
+from oxbow.testing import nasty_polygons
 
 quick = settings(max_examples=20)
 

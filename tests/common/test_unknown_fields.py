@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from oxbow.mission import mission_json, parse_mission
-from oxbow.site import Site
+from oxbow.mission.file import mission_json, parse_mission
+from oxbow.site.site import Site
 
 POND = [{"lat": lat, "long": long} for lat, long in ((46.0, 1.0), (46.0, 1.01), (46.01, 1.01), (46.01, 1.0))]
 FIELDS = {"MissionType": "adap", "LaunchPoint": POND[0], "BoundingBox": POND}

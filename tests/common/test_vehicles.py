@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from oxbow.contracts import Role
 from oxbow.errors import InvalidMission
-from oxbow.mission import MissionType, mission_json, parse_mission
-from oxbow.site import Site
+from oxbow.mission.file import MissionType, mission_json, parse_mission
+from oxbow.site.site import Site
 
 TYPES = [kind.value for kind in MissionType]
 

@@ -10,10 +10,10 @@ from shapely import LineString, affinity
 
 from oxbow.contracts import ASSIGN, CERTIFY, CONTOUR, DECOMPOSE, PATH, Fault, Method, Rule
 from oxbow.errors import Internal
-from oxbow.frame import Frame
-from oxbow.mission import parse_mission
-from oxbow.pipeline import plan_mission
-from oxbow.plan import PlanOptions
+from oxbow.geometry.frame import Frame
+from oxbow.mission.file import parse_mission
+from oxbow.mission.plan import PlanOptions
+from oxbow.planning.pipeline import plan_mission
 from oxbow_cli.local import local_call
 
 FRAME = Frame(lat=46.0, long=2.0)

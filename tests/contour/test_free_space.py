@@ -6,11 +6,11 @@ from hypothesis import strategies as st
 from msgspec import structs
 from shapely import Point, Polygon, affinity, box
 
-from oxbow.codec import encode
 from oxbow.contracts import ContourRequest, FreeSpace
 from oxbow.errors import Infeasible
-from oxbow.recording import discard
 from oxbow.testing import nasty_polygons
+from oxbow.wire.codec import encode
+from oxbow.wire.recording import discard
 from oxbow_contour.free_space import default_tolerance_m
 from oxbow_contour.service import handle
 from oxbow_contour.verification import is_safe

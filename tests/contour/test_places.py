@@ -8,8 +8,8 @@ from shapely import MultiPolygon, Point, Polygon, box
 
 from oxbow.contracts import ContourRequest, FreeSpace
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.narrows import is_basin, without_narrows
-from oxbow.recording import discard
+from oxbow.geometry.narrows import is_basin, without_narrows
+from oxbow.wire.recording import discard
 from oxbow_contour.service import handle
 
 SQUARE = box(0, 0, 100, 100)

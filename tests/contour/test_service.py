@@ -6,9 +6,9 @@ import pytest
 import shapely
 from shapely import Polygon, box
 
-from oxbow.codec import decode, encode
 from oxbow.contracts import ContourRequest, FreeSpace
-from oxbow.recording import Layer, discard
+from oxbow.wire.codec import decode, encode
+from oxbow.wire.recording import Layer, discard
 from oxbow_contour.service import handle
 from real_lakes import MISSIONS, needs_missions
 

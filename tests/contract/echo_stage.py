@@ -18,9 +18,9 @@ from shapely import Polygon
 
 from oxbow.contracts import Endpoint, Message
 from oxbow.errors import Busy, DeadlineExceeded, ErrorCode, ErrorReply, Infeasible, InvalidMission, Unavailable
-from oxbow.recording import Layer, Show
 from oxbow.stage import serve_stage
 from oxbow.stage.wire import Described, Done, Failed, FromWorker
+from oxbow.wire.recording import Layer, Show
 
 
 class Deed(enum.StrEnum):

@@ -11,13 +11,13 @@ import shapely
 from bus_processes import end, launch, wait_until
 from echo_stage import ECHO, SQUARE, Deed, EchoRequest, handle
 
-from oxbow import codec
 from oxbow.bus import Bus, BusCall
 from oxbow.bus.router import RouterProcess
 from oxbow.contracts import ANY_LAYER, Call
 from oxbow.errors import Infeasible, InvalidMission, OxbowError
-from oxbow.local import LocalCall
-from oxbow.recording import Layer, Stamped
+from oxbow.stage.local import LocalCall
+from oxbow.wire import codec
+from oxbow.wire.recording import Layer, Stamped
 
 pytestmark = pytest.mark.processes
 

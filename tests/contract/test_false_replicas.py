@@ -12,13 +12,13 @@ import pytest
 from bus_processes import end, launch, wait_until
 from echo_stage import ECHO, SQUARE, Echo, EchoRequest
 
-from oxbow import codec
 from oxbow.bus import Bus, BusCall, Envelope
 from oxbow.bus.query import MSGPACK, Query
 from oxbow.bus.router import RouterProcess
 from oxbow.contracts import Endpoint
-from oxbow.envelope import StageError
 from oxbow.errors import ErrorCode, ErrorReply, Infeasible, Internal, InvalidMission
+from oxbow.wire import codec
+from oxbow.wire.envelope import StageError
 
 pytestmark = pytest.mark.processes
 

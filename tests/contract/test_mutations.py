@@ -11,7 +11,6 @@ import shapely
 from mutations import mutated
 from shapely import Polygon
 
-from oxbow import codec
 from oxbow.contracts import (
     STAGES,
     AssignRequest,
@@ -28,7 +27,8 @@ from oxbow.contracts import (
     WeightedArea,
 )
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.recording import discard
+from oxbow.wire import codec
+from oxbow.wire.recording import discard
 from oxbow_cli.local import local_call
 
 CHEAP = ("contour", "decomposition", "certificate")

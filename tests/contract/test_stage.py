@@ -17,13 +17,13 @@ import pytest
 from bus_processes import Replica, end, launch, run_python, wait_gone, wait_until
 from echo_stage import ECHO, SQUARE, Deed, EchoRequest
 
-from oxbow import codec
 from oxbow.bus import Bus, BusCall, Envelope
 from oxbow.bus.router import RouterProcess
 from oxbow.contracts import INTROSPECTION, MAX_REQUEST_BYTES, any_introspection_key
 from oxbow.errors import Busy, DeadlineExceeded, Infeasible, Internal, InvalidMission, OxbowError, Unavailable
-from oxbow.introspection import Info, Ping, Stats
 from oxbow.stage import serve_stage
+from oxbow.wire import codec
+from oxbow.wire.introspection import Info, Ping, Stats
 
 pytestmark = pytest.mark.processes
 

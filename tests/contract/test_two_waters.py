@@ -21,13 +21,13 @@ from bus_processes import end, wait_until
 from mutations import mutated
 from shapely import Point, Polygon
 
-from oxbow import codec
 from oxbow.bus import Bus, BusCall
 from oxbow.bus.router import RouterProcess
 from oxbow.contracts import CONTOUR, DECOMPOSE, ContourRequest, DecomposeRequest, Endpoint, FreeSpace, Message
 from oxbow.errors import OxbowError
-from oxbow.introspection import Info
-from oxbow.recording import discard
+from oxbow.wire import codec
+from oxbow.wire.introspection import Info
+from oxbow.wire.recording import discard
 from oxbow_contour.service import handle
 
 pytestmark = pytest.mark.processes

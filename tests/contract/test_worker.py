@@ -15,7 +15,6 @@ import pytest
 from bus_processes import wait_gone, wait_until
 from echo_stage import ECHO, SQUARE, Deed, Echo, EchoRequest
 
-from oxbow import codec
 from oxbow.bus import Bus, Envelope, Session
 from oxbow.bus.router import RouterProcess
 from oxbow.errors import DeadlineExceeded, ErrorCode, Infeasible, Internal, OxbowError
@@ -23,6 +22,7 @@ from oxbow.stage.service import Stage
 from oxbow.stage.watch import is_stopped
 from oxbow.stage.wire import Done, Failed, Job, Shown
 from oxbow.stage.worker import Worker, WorkerLost
+from oxbow.wire import codec
 
 pytestmark = pytest.mark.processes
 

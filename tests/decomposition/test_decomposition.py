@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from shapely import Point, Polygon, affinity, box
 
 from oxbow.contracts import CriticalKind, DecomposeRequest, Decomposition
-from oxbow.recording import Layer, LayerKind, discard
-from oxbow.reeb import cell_polygon, reeb_graph
-from oxbow.sweep import from_sweep, to_sweep
+from oxbow.geometry.reeb import cell_polygon, reeb_graph
+from oxbow.geometry.sweep import from_sweep, to_sweep
 from oxbow.testing import nasty_polygons
+from oxbow.wire.recording import Layer, LayerKind, discard
 from oxbow_decomposition.cells import decompose
 from oxbow_decomposition.headings import predicted_cost, scored_headings
 from oxbow_decomposition.service import handle

@@ -8,11 +8,11 @@ from shapely import LineString, MultiPolygon, Point, Polygon, box
 
 from oxbow.contracts import Method
 from oxbow.errors import Infeasible, InvalidMission
-from oxbow.frame import lonlat
-from oxbow.mission import Mission, parse_mission
-from oxbow.pipeline import plan_mission
-from oxbow.plan import PlanOptions
-from oxbow.site import Site
+from oxbow.geometry.frame import lonlat
+from oxbow.mission.file import Mission, parse_mission
+from oxbow.mission.plan import PlanOptions
+from oxbow.planning.pipeline import plan_mission
+from oxbow.site.site import Site
 from oxbow_cli.local import local_call
 
 LAKE = box(0, 0, 60, 40)

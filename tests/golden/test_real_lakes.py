@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from oxbow.contracts import Method
-from oxbow.mission import PlanOptions, mission_json, read_mission
-from oxbow.pipeline import plan_mission
+from oxbow.mission.file import PlanOptions, mission_json, read_mission
+from oxbow.planning.pipeline import plan_mission
 from oxbow_cli.evaluation import evaluate
 from oxbow_cli.local import local_call
 from real_lakes import mission_file, needs_referee, referee

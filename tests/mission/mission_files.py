@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from oxbow.bus import Session
-from oxbow.mission import Mission
+from oxbow.mission.file import Mission
 
 __all__ = [
     "BLOOM",

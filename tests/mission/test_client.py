@@ -21,8 +21,8 @@ from oxbow.bus import Bus
 from oxbow.bus.router import start_router
 from oxbow.contracts import PLAN_KEY, MissionState, MissionStatus, live_key, mission_key
 from oxbow.errors import Cancelled, ErrorCode, Internal, InvalidMission, OxbowError
-from oxbow.mission import mission_json, parse_mission
-from oxbow.submission import Submission
+from oxbow.mission.file import mission_json, parse_mission
+from oxbow.planning.submission import Submission
 
 pytestmark = pytest.mark.processes
 

@@ -21,7 +21,7 @@ from oxbow import Client
 from oxbow.bus import Bus
 from oxbow.contracts import MissionState, MissionStatus
 from oxbow.errors import Internal, Unavailable
-from oxbow.mission import parse_mission
+from oxbow.mission.file import parse_mission
 from oxbow_mission.database import Database
 from oxbow_mission.store import SCHEMA, Request, Store
 

@@ -14,7 +14,7 @@ from mission_processes import STAGES, end, launch
 from oxbow.bus import Bus
 from oxbow.contracts import MissionState, MissionStatus
 from oxbow.errors import ErrorCode
-from oxbow.submission import SubmissionParameters
+from oxbow.planning.submission import SubmissionParameters
 from oxbow_mission import planner as bounds
 from oxbow_mission.database import Database
 from oxbow_mission.planner import Planner

@@ -13,13 +13,14 @@ import msgspec
 import pytest
 from mission_files import BLOOM, BROKEN_SEED, INFEASIBLE_SEED, Samples, listening, mission_file, revision_of
 
-from oxbow import Client, codec
+from oxbow import Client
 from oxbow.bus import Bus
 from oxbow.contracts import PLAN_KEY, MissionState, MissionStatus, mission_key
 from oxbow.errors import DeadlineExceeded, ErrorCode, Infeasible, Internal, InvalidMission
-from oxbow.introspection import Info, Ping, Stats
-from oxbow.mission import parse_mission
-from oxbow.recording import LayerKind, Stamped
+from oxbow.mission.file import parse_mission
+from oxbow.wire import codec
+from oxbow.wire.introspection import Info, Ping, Stats
+from oxbow.wire.recording import LayerKind, Stamped
 
 pytestmark = pytest.mark.processes
 

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from oxbow.contracts import Method, checked_id
 from oxbow.errors import InvalidMission
-from oxbow.mission import Position
-from oxbow.submission import Submission, SubmissionParameters
+from oxbow.mission.file import Position
+from oxbow.planning.submission import Submission, SubmissionParameters
 
 LAKE: dict[str, Any] = {
     "MissionType": "map",

@@ -13,7 +13,6 @@ import msgspec
 from mission_files import BROKEN_SEED, INFEASIBLE_SEED, POISON_SEED
 from shapely import LineString
 
-from oxbow import codec
 from oxbow.bus import Envelope, Session
 from oxbow.bus.query import MSGPACK, Query
 from oxbow.contracts import (
@@ -36,9 +35,10 @@ from oxbow.contracts import (
     PathRequest,
     Sortie,
 )
-from oxbow.envelope import StageError
 from oxbow.errors import ErrorReply, Infeasible, Internal, OxbowError, described
-from oxbow.lifetime import Lifetime
+from oxbow.runtime.lifetime import Lifetime
+from oxbow.wire import codec
+from oxbow.wire.envelope import StageError
 
 
 def contour(request: ContourRequest) -> FreeSpace:

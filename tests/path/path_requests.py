@@ -9,11 +9,12 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from oxbow.contracts import ContourRequest, DecomposeRequest, Method, PathPlan, PathRequest, Place
+from oxbow.arrays import Place
+from oxbow.contracts import ContourRequest, DecomposeRequest, Method, PathPlan, PathRequest
+from oxbow.contracts.budget import nominal_spacing_m
 from oxbow.errors import Infeasible, renamed
-from oxbow.recording import discard
-from oxbow.spacing import nominal_spacing_m
 from oxbow.testing import nasty_polygons
+from oxbow.wire.recording import discard
 from oxbow_contour.service import handle as contour
 from oxbow_decomposition.service import handle as decompose
 from oxbow_path.service import planned

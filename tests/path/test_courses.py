@@ -10,8 +10,8 @@ from shapely import LineString, Point, affinity, box
 
 from oxbow.contracts import Method, PathPlan, PathRequest
 from oxbow.errors import Infeasible
-from oxbow.recording import discard
-from oxbow.route.mesh import Mesh
+from oxbow.geometry.route.mesh import Mesh
+from oxbow.wire.recording import discard
 from oxbow_path.course import best_plan
 from oxbow_path.course.loops import Middles
 from oxbow_path.service import handle

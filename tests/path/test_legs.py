@@ -7,9 +7,9 @@ import shapely
 from path_requests import request
 from shapely import LineString, Point, Polygon, box
 
-from oxbow.conformance import strays
-from oxbow.recording import discard
-from oxbow.route.gate_routes import Routes
+from oxbow.geometry.conformance import strays
+from oxbow.geometry.route.gate_routes import Routes
+from oxbow.wire.recording import discard
 from oxbow_path.service import handle
 from oxbow_path.walk.legs import Passable, access, joined
 

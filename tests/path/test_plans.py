@@ -10,8 +10,8 @@ from shapely import LineString, Point, Polygon, affinity, box
 
 from oxbow.contracts import Method, PathPlan, PathRequest
 from oxbow.errors import Infeasible
-from oxbow.recording import Layer, discard
 from oxbow.testing import nasty_polygons
+from oxbow.wire.recording import Layer, discard
 from oxbow_path.service import handle
 
 quick = settings(max_examples=8)

@@ -10,16 +10,16 @@ from hypothesis import strategies as st
 from path_requests import lake, request
 from shapely import LineString, Point, Polygon, box
 
-from oxbow.recording import discard
-from oxbow.route.gate_routes import Routes
+from oxbow.geometry.route.gate_routes import Routes
 from oxbow.testing import nasty_polygons
+from oxbow.wire.recording import discard
 from oxbow_path.service import handle
 from oxbow_path.task import prepared_waters
-from oxbow_path.transect.circuit import plan_circuit
-from oxbow_path.transect.transects import place_transects
+from oxbow_path.walk.circuit import plan_circuit
 from oxbow_path.walk.gaps import reach_gaps
 from oxbow_path.walk.probe import Probe, covered
 from oxbow_path.walk.region import Brush, Walk, dilated, simply_connected
+from oxbow_path.walk.transects import place_transects
 
 quick = settings(max_examples=12)
 

@@ -9,12 +9,12 @@ from path_requests import lake, request
 from shapely import LineString, box
 
 from oxbow.contracts import Draw, Method
-from oxbow.recording import discard
-from oxbow.reeb import cell_polygon
+from oxbow.geometry.reeb import cell_polygon
+from oxbow.wire.recording import discard
 from oxbow_path.refinement import Guard, Polyline
-from oxbow_path.ring.draws import cell_draws, drawn_places
-from oxbow_path.ring.kohonen import Schedule, organised
 from oxbow_path.service import handle
+from oxbow_path.space_filling_curve.draws import cell_draws, drawn_places
+from oxbow_path.space_filling_curve.kohonen import Schedule, organised
 
 quick = settings(max_examples=12)
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from path_requests import lake
 from shapely import LineString, Point, Polygon, box
 
-from oxbow.route.gate_routes import Routes, taut
+from oxbow.geometry.route.gate_routes import Routes, taut
 
 quick = settings(max_examples=12)
 

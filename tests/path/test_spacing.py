@@ -5,7 +5,7 @@ from path_requests import lake, request
 from shapely import LineString, box
 
 from oxbow.errors import Infeasible
-from oxbow_path.transect.circuit import plan_circuit
+from oxbow_path.walk.circuit import plan_circuit
 from oxbow_path.walk.region import Walk
 from oxbow_path.walk.spacing import Budget, fitted
 from oxbow_path.walk.trial import Pattern, Trial

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from path_requests import lake, request
 from shapely import LineString
 
-from oxbow.reeb import cell_polygon
+from oxbow.geometry.reeb import cell_polygon
 from oxbow_path.task import prepared_waters
-from oxbow_path.transect.circuit import plan_circuit
-from oxbow_path.transect.pattern import try_transects
-from oxbow_path.transect.transects import place_transects
+from oxbow_path.walk.circuit import plan_circuit
+from oxbow_path.walk.pattern import try_transects
+from oxbow_path.walk.transects import place_transects
 from oxbow_path.walk.trial import Pattern
 
 quick = settings(max_examples=12)

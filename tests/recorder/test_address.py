@@ -7,10 +7,10 @@ import msgspec
 import pytest
 import shapely
 
-from oxbow.codec import encode
 from oxbow.contracts import layer_key
 from oxbow.errors import InvalidMission
-from oxbow.recording import Layer, Stamped
+from oxbow.wire.codec import encode
+from oxbow.wire.recording import Layer, Stamped
 from oxbow_recorder.address import MOST_LAYER_BYTES, Run, address_of
 from oxbow_recorder.files import ABANDONED_S, part_path, recording_path, sweep
 

@@ -11,9 +11,9 @@ import shapely
 
 from oxbow.bus import Session
 from oxbow.bus.router import start_router
-from oxbow.codec import encode
 from oxbow.contracts import layer_key
-from oxbow.recording import Layer, LayerKind, Stamped
+from oxbow.wire.codec import encode
+from oxbow.wire.recording import Layer, LayerKind, Stamped
 
 pytestmark = pytest.mark.processes
 

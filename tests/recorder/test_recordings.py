@@ -9,10 +9,10 @@ import pytest
 import shapely
 
 from oxbow.errors import Unavailable
-from oxbow.mission import read_mission
-from oxbow.pipeline import plan_mission
-from oxbow.recording import Layer, LayerKind, Stamped
-from oxbow.route import RouteMethod
+from oxbow.geometry.route import RouteMethod
+from oxbow.mission.file import read_mission
+from oxbow.planning.pipeline import plan_mission
+from oxbow.wire.recording import Layer, LayerKind, Stamped
 from oxbow_cli.local import local_call
 from oxbow_recorder.address import Run
 from oxbow_recorder.blueprint import blueprint

@@ -10,9 +10,9 @@ import psutil
 import pytest
 import shapely
 
-from oxbow.codec import encode
 from oxbow.contracts import layer_key
-from oxbow.recording import Layer, LayerKind, Stamped
+from oxbow.wire.codec import encode
+from oxbow.wire.recording import Layer, LayerKind, Stamped
 from oxbow_recorder import runs as runs_module
 from oxbow_recorder.address import Run
 from oxbow_recorder.files import holds

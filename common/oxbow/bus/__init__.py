@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from oxbow.bus.config import DEFAULT_ENDPOINT
 from oxbow.bus.session import Session
 from oxbow.bus.subscription import Subscription
-from oxbow.envelope import Envelope
+from oxbow.wire.envelope import Envelope
 
 if TYPE_CHECKING:
     from oxbow.bus.client import Bus, BusCall

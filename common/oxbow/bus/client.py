@@ -10,14 +10,14 @@ from typing import Any, Generic, TypeVar
 import msgspec
 import zenoh
 
-from oxbow import codec
 from oxbow.bus.replicas import Replicas
 from oxbow.bus.session import Session, error_of, is_timeout, told_error
 from oxbow.contracts import ANY_LIVE, MAX_REQUEST_BYTES, Endpoint, Message, live_service
-from oxbow.envelope import Envelope
+from oxbow.contracts.ids import MOST_ID_CHARACTERS
 from oxbow.errors import Busy, DeadlineExceeded, ErrorCode, Internal, InvalidMission, OxbowError, Unavailable
-from oxbow.ids import MOST_ID_CHARACTERS
-from oxbow.waits import checked_wait
+from oxbow.wire import codec
+from oxbow.wire.envelope import Envelope
+from oxbow.wire.waits import checked_wait
 
 __all__ = ["Bus", "BusCall"]
 

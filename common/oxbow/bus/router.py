@@ -19,7 +19,7 @@ import zenoh
 
 from oxbow.bus.config import DEFAULT_ENDPOINT, router_config
 from oxbow.errors import OxbowError, Unavailable
-from oxbow.lifetime import Lifetime
+from oxbow.runtime.lifetime import Lifetime
 
 __all__ = ["RouterProcess", "free_endpoint", "run_router", "start_router"]
 

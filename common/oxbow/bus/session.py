@@ -20,8 +20,7 @@ from oxbow.bus.config import DEFAULT_ENDPOINT, client_config
 from oxbow.bus.mailbox import Mailbox
 from oxbow.bus.query import JSON, Query
 from oxbow.bus.subscription import Audience, Declared, OnQuery, OnSample, Subscription
-from oxbow.closing import Closing
-from oxbow.envelope import StageError
+from oxbow.contracts.ids import excerpt
 from oxbow.errors import (
     Busy,
     DeadlineExceeded,
@@ -33,9 +32,10 @@ from oxbow.errors import (
     Unavailable,
     described,
 )
-from oxbow.ids import excerpt
-from oxbow.strict_json import decode_json
-from oxbow.waits import checked_wait
+from oxbow.runtime.closing import Closing
+from oxbow.wire.envelope import StageError
+from oxbow.wire.strict_json import decode_json
+from oxbow.wire.waits import checked_wait
 
 __all__ = ["MOST_KEY_BYTES", "Session", "error_of", "is_timeout", "told_error"]
 
@@ -246,7 +246,7 @@ class Session(Closing):
         ------
         OxbowError
             The error that was replied; `DeadlineExceeded` after `timeout_s`; `Unavailable` where nobody answered;
-            `InvalidMission` where the selector is none, or `timeout_s` is no wait (`oxbow.waits`).
+            `InvalidMission` where the selector is none, or `timeout_s` is no wait (`oxbow.wire.waits`).
         """
         found: list[tuple[str, bytes]] = []
         failure: OxbowError | None = None

@@ -1,6 +1,6 @@
 """Every message between Oxbow's processes, and the endpoints that exchange them.
 
-All geometry is planar, in metres, in the mission's local frame (`oxbow.frame`): x east, y north.
+All geometry is planar, in metres, in the mission's local frame (`oxbow.geometry.frame`): x east, y north.
 A message that exists is valid: `__post_init__` enforces its invariants on both sides of the bus.
 Each stage has a module here. Key expressions stand in `keys` and nowhere else.
 """
@@ -48,9 +48,7 @@ from oxbow.contracts.keys import (
 from oxbow.contracts.message import (
     MOST_LENGTH_M,
     MOST_SEED,
-    FloatArray,
     Message,
-    Place,
     require_area,
     require_finite,
     require_line,
@@ -106,7 +104,6 @@ __all__ = [
     "DroppedPart",
     "Endpoint",
     "Fault",
-    "FloatArray",
     "FreeSpace",
     "HeadingScore",
     "HotSpot",
@@ -121,7 +118,6 @@ __all__ = [
     "PathPlan",
     "PathRequest",
     "Per",
-    "Place",
     "Role",
     "Rule",
     "Share",

@@ -8,20 +8,20 @@ import math
 from msgspec import field
 from shapely import LineString, Polygon
 
+from oxbow.arrays import Place
 from oxbow.contracts.contour import DroppedPart
 from oxbow.contracts.danger import DANGER_DETOUR_M, DangerZone
+from oxbow.contracts.ids import MOST_ID_CHARACTERS, excerpt
 from oxbow.contracts.message import (
     MOST_LENGTH_M,
     MOST_SEED,
     Message,
-    Place,
     require_area,
     require_finite,
     require_line,
     require_place,
 )
 from oxbow.errors import InvalidMission, renamed
-from oxbow.ids import MOST_ID_CHARACTERS, excerpt
 from oxbow.tolerances import FARTHEST_M
 
 __all__ = ["AssignRequest", "Assignment", "HotSpot", "LeftSpot", "Role", "Share", "Sortie", "Vehicle"]

@@ -7,8 +7,9 @@ import math
 
 from shapely import LineString, Polygon
 
+from oxbow.arrays import Place
 from oxbow.contracts.danger import DangerZone
-from oxbow.contracts.message import Message, Place, require_area, require_finite, require_line, require_place
+from oxbow.contracts.message import Message, require_area, require_finite, require_line, require_place
 from oxbow.errors import InvalidMission
 from oxbow.tolerances import FARTHEST_M
 
@@ -208,8 +209,8 @@ class Certificate(Measures, frozen=True, kw_only=True):
     """The measures of a path, and the place of the free space that is farthest from it.
 
     `tracks` are the figures of each path, where there are several. `faults` are the rules that paths break.
-    `request_digest` is that of the request (`oxbow.codec.digest`), so that a certificate cannot be taken for that
-    of another path or another water.
+    `request_digest` is that of the request (`oxbow.wire.codec.digest`), so that a certificate cannot be taken for
+    that of another path or another water.
     """
 
     request_digest: str

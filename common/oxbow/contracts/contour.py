@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from shapely import Polygon
 
+from oxbow.arrays import Place
 from oxbow.contracts.message import (
     MOST_LENGTH_M,
     Message,
-    Place,
     require_area,
     require_finite,
     require_place,

@@ -8,15 +8,8 @@ import math
 import numpy as np
 from shapely import Polygon
 
-from oxbow.contracts.message import (
-    MOST_LENGTH_M,
-    FloatArray,
-    Message,
-    Place,
-    require_area,
-    require_finite,
-    require_place,
-)
+from oxbow.arrays import FloatArray, Place
+from oxbow.contracts.message import MOST_LENGTH_M, Message, require_area, require_finite, require_place
 from oxbow.errors import InvalidMission
 from oxbow.tolerances import FARTHEST_M, ROUNDING_M
 

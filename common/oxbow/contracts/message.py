@@ -8,20 +8,18 @@ from collections.abc import Iterable, Iterator
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.arrays import Place
 from oxbow.errors import InvalidMission
 from oxbow.tolerances import FARTHEST_M
 
 __all__ = [
     "MOST_LENGTH_M",
     "MOST_SEED",
-    "FloatArray",
     "Message",
-    "Place",
     "require_area",
     "require_finite",
     "require_line",
@@ -39,10 +37,6 @@ MOST_LENGTH_M = 1e9
 """More than any vehicle travels: 25 times round the Earth."""
 
 MOST_SHOWN_BITS = 64
-
-FloatArray = npt.NDArray[np.float64]
-Place = tuple[float, float]
-"""A planar position (x east, y north) in metres."""
 
 
 class Message(msgspec.Struct, frozen=True, kw_only=True):

@@ -7,13 +7,13 @@ import math
 
 from shapely import LineString, Polygon
 
+from oxbow.arrays import Place
 from oxbow.contracts.contour import DroppedPart, FreeSpace
 from oxbow.contracts.decomposition import Decomposition
 from oxbow.contracts.message import (
     MOST_LENGTH_M,
     MOST_SEED,
     Message,
-    Place,
     require_area,
     require_finite,
     require_line,

@@ -15,14 +15,14 @@ import numpy as np
 from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
-from oxbow import codec
 from oxbow.contracts import INTROSPECTION, MAX_REQUEST_BYTES, Endpoint, any_layer_key, layer_key
-from oxbow.envelope import Envelope
 from oxbow.errors import ErrorReply, Infeasible, Internal, InvalidMission, OxbowError, described
-from oxbow.local import Handler
-from oxbow.recording import Layer, Show, Stamped, discard
+from oxbow.stage.local import Handler
 from oxbow.stage.wire import Described, Done, Failed, FromWorker, Job, Shown
 from oxbow.stage.worker import needs_memory
+from oxbow.wire import codec
+from oxbow.wire.envelope import Envelope
+from oxbow.wire.recording import Layer, Show, Stamped, discard
 
 __all__ = ["is_memory_error", "serve"]
 
@@ -149,7 +149,7 @@ def _description(endpoint: Endpoint[Any, Any], instance: str) -> Described:
 
 
 def _schema_of_custom(kind: Any) -> dict[str, Any]:
-    """How `oxbow.codec` sends what msgspec does not know."""
+    """How `oxbow.wire.codec` sends what msgspec does not know."""
     origin = getattr(kind, "__origin__", kind)
     if isinstance(origin, type) and issubclass(origin, BaseGeometry):
         return {"type": "string", "format": "binary", "description": f"{origin.__name__} as WKB, planar metres"}

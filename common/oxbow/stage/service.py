@@ -16,7 +16,7 @@ import msgspec
 from oxbow.bus.mailbox import Mailbox
 from oxbow.bus.query import MSGPACK, Query
 from oxbow.bus.session import Session
-from oxbow.envelope import Envelope, StageError
+from oxbow.contracts.ids import excerpt
 from oxbow.errors import (
     Busy,
     DeadlineExceeded,
@@ -27,11 +27,11 @@ from oxbow.errors import (
     Unavailable,
     described,
 )
-from oxbow.ids import excerpt
-from oxbow.introspection import Info, Ping, Stats, rss_bytes
 from oxbow.stage.answered import Answered, digest, require_same
 from oxbow.stage.wire import Described, Done, Failed, Job, Shown
 from oxbow.stage.worker import Worker
+from oxbow.wire.envelope import Envelope, StageError
+from oxbow.wire.introspection import Info, Ping, Stats, rss_bytes
 
 __all__ = ["Stage"]
 

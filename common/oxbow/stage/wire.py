@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import msgspec
 
-from oxbow.envelope import Envelope
 from oxbow.errors import ErrorReply
+from oxbow.wire.envelope import Envelope
 
 __all__ = ["MOST_MESSAGE_BYTES", "Described", "Done", "Failed", "FromWorker", "Job", "Shown"]
 

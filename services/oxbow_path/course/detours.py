@@ -14,9 +14,8 @@ import shapely
 from scipy.spatial import cKDTree
 from shapely import LineString, Point, Polygon
 
-from oxbow.arrays import Indices
-from oxbow.contracts import FloatArray
-from oxbow.route.gate_routes import Inward
+from oxbow.arrays import FloatArray, Indices
+from oxbow.geometry.route.gate_routes import Inward
 from oxbow.tolerances import ROUNDING_M
 from oxbow_path.walk.legs import is_plainly_simple
 from oxbow_path.walk.region import largest

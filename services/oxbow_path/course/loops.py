@@ -16,9 +16,8 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 from shapely import LinearRing
 
-from oxbow.arrays import Indices, Mask
-from oxbow.contracts import FloatArray
-from oxbow.route.mesh import Mesh
+from oxbow.arrays import FloatArray, Indices, Mask
+from oxbow.geometry.route.mesh import Mesh
 from oxbow_path.walk.region import largest
 
 __all__ = ["Middles"]

@@ -12,15 +12,15 @@ from shapely import LineString, Polygon
 
 from oxbow.contracts import SpacingStep
 from oxbow.errors import Infeasible, Internal
-from oxbow.route import RouteMethod, make_router
+from oxbow.geometry.route import RouteMethod, make_router
 from oxbow.tolerances import ROUNDING_M
 from oxbow_path.course.detours import detoured, with_detours
 from oxbow_path.course.loops import Middles
 from oxbow_path.improvement import improved
 from oxbow_path.refinement import Polyline
 from oxbow_path.task import Display, MethodPlan, PathMethod, Task
-from oxbow_path.transect import try_transects
 from oxbow_path.walk.legs import joined
+from oxbow_path.walk.pattern import try_transects
 from oxbow_path.walk.trial import CUT, Pattern
 
 __all__ = ["best_plan"]

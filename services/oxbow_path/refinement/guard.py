@@ -10,8 +10,7 @@ import shapely
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.arrays import Indices, Mask
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray, Indices, Mask
 from oxbow.tolerances import ROUNDING_M
 from oxbow_path.refinement.inside import Inside
 from oxbow_path.refinement.nearness import beyond, least_gap_m, may_meet, nearer, steps_between

@@ -10,8 +10,7 @@ import shapely
 from scipy.spatial import cKDTree
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.arrays import Indices, Mask
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray, Indices, Mask
 from oxbow_path.refinement.polyline import Polyline
 
 __all__ = ["Inside"]

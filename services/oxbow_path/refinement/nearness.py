@@ -10,8 +10,7 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from oxbow.arrays import Indices, Mask
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray, Indices, Mask
 from oxbow.tolerances import ROUNDING_M
 from oxbow_path.refinement.polyline import Polyline
 

@@ -10,8 +10,7 @@ import shapely
 from shapely import LineString
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.arrays import Indices, Mask
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray, Indices, Mask
 
 __all__ = ["Polyline"]
 

@@ -9,8 +9,7 @@ import numpy as np
 from scipy.linalg import solveh_banded
 from scipy.spatial import cKDTree
 
-from oxbow.arrays import Indices
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray, Indices
 from oxbow_path.refinement.polyline import Polyline
 from oxbow_path.refinement.samples import Samples
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from shapely import LineString, Polygon
 
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray
 from oxbow_path.refinement.guard import Guard
 from oxbow_path.refinement.polyline import Polyline
 from oxbow_path.refinement.pull import Pull, feet

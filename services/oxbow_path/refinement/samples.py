@@ -11,8 +11,9 @@ import numpy as np
 import shapely
 from shapely import Polygon, STRtree
 
-from oxbow.contracts import FloatArray, WeightedArea
-from oxbow.lattice import lattice_within
+from oxbow.arrays import FloatArray
+from oxbow.contracts import WeightedArea
+from oxbow.geometry.lattice import lattice_within
 
 __all__ = ["Samples", "weights_at"]
 

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from shapely import LineString, Polygon
 
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray
 from oxbow_path.refinement.guard import Guard
 from oxbow_path.refinement.polyline import Polyline
 

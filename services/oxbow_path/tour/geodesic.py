@@ -21,10 +21,9 @@ from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 from shapely import MultiPoint, Polygon
 
-from oxbow.arrays import Indices
-from oxbow.contracts import FloatArray
-from oxbow.route.mesh import Mesh, Touches
-from oxbow.triangles import following
+from oxbow.arrays import FloatArray, Indices
+from oxbow.geometry.route.mesh import Mesh, Touches
+from oxbow.geometry.triangles import following
 from oxbow_path.tour.sight import Sight
 
 __all__ = ["Geodesics", "Shore"]

@@ -16,8 +16,7 @@ import shapely
 from shapely import LineString, Point, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.arrays import Geometries, Mask
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray, Geometries, Mask
 from oxbow.tolerances import ROUNDING_M
 from oxbow_path.tour.slits import GRID_M, slit
 from oxbow_path.walk.region import largest

@@ -11,8 +11,7 @@ import numpy as np
 import shapely
 from shapely import LineString, Polygon
 
-from oxbow.arrays import Indices
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray, Indices
 from oxbow.tolerances import ROUNDING_M
 from oxbow_path.task import Task
 from oxbow_path.tour.geodesic import Geodesics, Shore

@@ -10,8 +10,7 @@ import heapq
 
 import numpy as np
 
-from oxbow.arrays import Indices
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray, Indices
 from oxbow_path.tour.geodesic import Geodesics
 
 __all__ = ["pruned"]

@@ -13,9 +13,8 @@ import numpy as np
 import shapely
 from shapely import Polygon, STRtree
 
-from oxbow.arrays import Geometries, Indices, Mask
-from oxbow.contracts import FloatArray
-from oxbow.triangles import cross
+from oxbow.arrays import FloatArray, Geometries, Indices, Mask
+from oxbow.geometry.triangles import cross
 
 __all__ = ["Sight"]
 

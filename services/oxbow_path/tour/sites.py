@@ -8,8 +8,8 @@ from scipy.spatial import cKDTree
 from scipy.stats import qmc
 from shapely import Polygon
 
-from oxbow.contracts import FloatArray
-from oxbow.triangles import spread
+from oxbow.arrays import FloatArray
+from oxbow.geometry.triangles import spread
 
 __all__ = ["clustered", "low_discrepancy", "with_gaps"]
 
@@ -21,8 +21,8 @@ def low_discrepancy(free: Polygon, count: int, *, seed: int) -> FloatArray:
     """Points of low discrepancy over a polygon, by area.
 
     The report keeps those points of a sequence over the bounding box that lie in the polygon. Here every point of
-    the Halton sequence is used, carried from the unit square onto the polygon (`oxbow.triangles.spread`). The
-    sequence is shifted at random, modulo 1 (Cranley and Patterson 1976).
+    the Halton sequence is used, carried from the unit square onto the polygon (`oxbow.geometry.triangles.spread`).
+    The sequence is shifted at random, modulo 1 (Cranley and Patterson 1976).
 
     Parameters
     ----------

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from oxbow.arrays import Indices
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray, Indices
 from oxbow_path.tour.geodesic import Geodesics
 
 __all__ = ["Start", "first_tour"]

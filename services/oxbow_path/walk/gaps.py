@@ -10,9 +10,8 @@ from scipy.spatial import cKDTree
 from shapely import LineString, Point, Polygon
 from shapely.ops import substring
 
-from oxbow.arrays import Indices
-from oxbow.contracts import FloatArray
-from oxbow.route.gate_routes import Inward, Routes
+from oxbow.arrays import FloatArray, Indices
+from oxbow.geometry.route.gate_routes import Inward, Routes
 from oxbow_path.walk.probe import Probe
 from oxbow_path.walk.region import Brush, Walk, largest, simply_connected
 

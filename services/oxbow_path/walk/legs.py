@@ -4,8 +4,9 @@ Equal points give one closed ring: out at one place, back in beside it. Points a
 travels the whole ring: round one side of the region from launch to recovery, back through its middle, and
 round the other side. (The report, Rendas and Li 2016, section 1.2.1.2, treats only equal points.)
 
-`oxbow.approach` makes legs of another kind, from gate to gate: both ways run beside a middle line, in water wide
-enough for them. Here a leg ends on the ring, and the way back opens from nothing, however narrow the water.
+`oxbow.planning.approach` makes legs of another kind, from gate to gate: both ways run beside a middle line, in
+water wide enough for them. Here a leg ends on the ring, and the way back opens from nothing, however narrow the
+water.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from shapely.affinity import rotate
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
-from oxbow.contracts import FloatArray, Place
+from oxbow.arrays import FloatArray, Place
 from oxbow.errors import Infeasible, Internal, renamed
-from oxbow.route import Landing, way_to
-from oxbow.route.gate_routes import Routes, taut
+from oxbow.geometry.route import Landing, way_to
+from oxbow.geometry.route.gate_routes import Routes, taut
 from oxbow.tolerances import HAIR_M, ON_SHORE_M, ROUNDING_M
 from oxbow_path.walk.region import largest
 from oxbow_path.walk.stretch import stretch

@@ -12,9 +12,8 @@ from scipy.spatial import cKDTree
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.arrays import Indices
-from oxbow.contracts import FloatArray
-from oxbow.lattice import lattice_within
+from oxbow.arrays import FloatArray, Indices
+from oxbow.geometry.lattice import lattice_within
 
 __all__ = ["Probe", "covered"]
 

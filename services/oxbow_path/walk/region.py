@@ -16,8 +16,7 @@ import shapely
 from shapely import LinearRing, LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.arrays import Indices
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray, Indices
 from oxbow_path.walk.probe import Probe, covered
 
 __all__ = ["Brush", "Circuit", "Walk", "clear_of_land", "dilated", "largest", "simply_connected"]

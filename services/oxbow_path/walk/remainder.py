@@ -11,7 +11,7 @@ import shapely
 from shapely import LineString, Point
 from shapely.ops import substring
 
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray
 from oxbow.tolerances import ROUNDING_M
 from oxbow_path.walk.gaps import branch_to
 from oxbow_path.walk.region import Brush, Walk, largest, simply_connected

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from oxbow.contracts.budget import LENGTH_RESERVE, too_short
 from oxbow.errors import Infeasible
-from oxbow.reserve import LENGTH_RESERVE, too_short
 from oxbow_path.walk.trial import Pattern, Trial
 
 __all__ = ["Budget", "Fit", "fitted"]

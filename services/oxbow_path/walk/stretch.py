@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from shapely import LineString
 
-from oxbow.contracts import FloatArray
+from oxbow.arrays import FloatArray
 
 __all__ = ["stretch"]
 

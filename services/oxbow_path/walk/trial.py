@@ -10,7 +10,7 @@ import shapely
 from shapely import LineString, Point, Polygon
 
 from oxbow.contracts import Cell
-from oxbow.route.gate_routes import Routes
+from oxbow.geometry.route.gate_routes import Routes
 from oxbow.tolerances import ROUNDING_M
 from oxbow_path.walk.gaps import branch_to, reach_gaps
 from oxbow_path.walk.legs import Access, Passable, is_plainly_simple, joined

@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from shapely import LinearRing, LineString, Polygon
 
-from oxbow.route.gate_routes import Routes
+from oxbow.geometry.route.gate_routes import Routes
 from oxbow_path.walk.region import Circuit
 
 __all__ = ["contour_tree"]

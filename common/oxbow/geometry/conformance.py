@@ -1,0 +1,386 @@
+"""Whether a path keeps the rules: in the water, clear of the shore but for its legs, and never across itself.
+
+The mission's own water is what counts, not a planner's picture of it. The certificate reports these figures, and
+the pipeline takes them once more before a plan leaves, so that no single wrong stage can send a boat ashore.
+
+A *leg* is the stretch of a path next to its launch or recovery point that runs nearer to the shore than the
+safety distance. The point itself makes a leg necessary where it lies ashore, in a harbour or up a creek. What
+exceeds that, and all that happens between the legs, is a fault.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from shapely import LineString, MultiLineString, MultiPolygon, Point, Polygon, STRtree
+from shapely.geometry.base import BaseGeometry
+from shapely.ops import substring
+
+from oxbow.arrays import FloatArray, Geometries, Place
+from oxbow.contracts import Fault, Leg, Rule
+from oxbow.geometry.narrows import DETOUR, direct_leg_m, is_basin, without_narrows
+from oxbow.geometry.route.gate_routes import Routes
+from oxbow.tolerances import ROUNDING_M
+
+__all__ = ["Conduct", "Shore", "crossings_of", "strays"]
+
+SHORE_TOLERANCE_M = 0.01
+"""A path this near to the shore is on it, and stretches this short are none: degrees of seven decimals are a
+centimetre."""
+
+SAME_PLACE_M = 1.0
+"""A path that begins farther than this from its launch point has no leg there that could be excused."""
+
+SAFETY_SHARE = 0.99
+"""The share of the safety distance that must be kept: eroded contours are polygons, not arcs."""
+
+OPEN_SHARE = 2.0
+"""A safe stretch shorter than so many safety distances does not end a leg, wherever it is."""
+
+BASIN_SHARE = 1.05
+"""Water farther from the shore than so many safety distances is free, whatever the planner simplified."""
+
+LOOK_SHARE = 4.0
+"""So many safety distances of a safe stretch are looked at to tell a basin from a wide spot of a creek."""
+
+RUN = 8
+"""Edges of the shore that are looked at together."""
+
+QUAD_SEGS = 16
+_CHUNK = 512
+
+
+@dataclass(frozen=True)
+class Conduct:
+    """How a path keeps the rules of the water.
+
+    Parameters
+    ----------
+    outside_m
+        Metres outside the water, those of the legs included; the shore itself, to 1 cm, is inside.
+    unsafe_m
+        Metres nearer to the shore than 99 % of the safety distance, beyond what the legs need.
+    legs
+        Of the launch and of the recovery.
+    faults
+        What breaks a rule; nothing, of a path that is fit to follow.
+    """
+
+    outside_m: float
+    unsafe_m: float
+    legs: tuple[Leg, Leg]
+    faults: tuple[Fault, ...]
+
+    @property
+    def crossings(self) -> int:
+        """Pairs of segments that meet."""
+        return sum(fault.count for fault in self.faults if fault.rule is Rule.CROSSING)
+
+
+class Shore:
+    """The shore of a mission's water, ready to judge paths.
+
+    Time and memory grow with the vertices of the shore and the stretches of path near it, not with the area.
+
+    Parameters
+    ----------
+    water
+        The outline less the forbidden zones.
+    safety_m
+        The distance that paths keep from its boundary.
+    least_width_m
+        Narrower water is no water to be reached from ashore.
+    """
+
+    def __init__(self, water: Polygon | MultiPolygon, safety_m: float, least_width_m: float = 0.0) -> None:
+        self.water = water
+        self.safety_m = safety_m
+        self.least_width_m = least_width_m
+        shapely.prepare(water)
+
+    @cached_property
+    def _runs(self) -> STRtree:
+        """The boundary in runs of a few edges."""
+        rings = shapely.get_rings(shapely.get_parts(self.water))
+        return STRtree(np.concatenate([_runs_of(shapely.get_coordinates(ring)) for ring in rings]))
+
+    @cached_property
+    def _parts(self) -> Geometries:
+        """The parts of the water that a vehicle fits into."""
+        return shapely.get_parts(without_narrows(self.water, self.least_width_m))
+
+    def conduct(self, path: LineString, launch: Place, recovery: Place) -> Conduct:
+        """Judge a path from `launch` to `recovery`."""
+        segments = _Segments.of(path)
+        outside = self._outside(segments)
+        unsafe = self._unsafe(segments, outside)
+        total_m = segments.length_m
+        off_m = shapely.distance(
+            shapely.points([launch, recovery]), shapely.points(segments.ends[[0, -1], [0, 1]])
+        )
+        out_m, home_m = np.where(off_m > SAME_PLACE_M, 0.0, self._leg_lengths(path, unsafe)).tolist()
+        ends = (_End("launch", launch, 0.0, out_m), _End("recovery", recovery, total_m, total_m - home_m))
+        legs = [
+            self._leg(end, path, _within(outside, *end.stretch), _within(unsafe, *end.stretch)) for end in ends
+        ]
+        between = ends[0].open_m, ends[1].open_m
+        faults = [
+            *_stretch_faults(Rule.OUTSIDE, path, _within(outside, *between)),
+            *_stretch_faults(Rule.UNSAFE, path, _within(unsafe, *between)),
+            *(fault for end, leg in zip(ends, legs, strict=True) for fault in _leg_faults(end, leg, path)),
+            *crossings_of(path),
+        ]
+        excess_m = sum(fault.metres for fault in faults if fault.rule is Rule.UNSAFE)
+        return Conduct(_length_m(outside), excess_m, (legs[0], legs[1]), tuple(faults))
+
+    def _outside(self, segments: _Segments) -> FloatArray:
+        """Stretches that lie in no water: a path changes sides only where it is near to the shore."""
+        beyond = _rest(self._near(segments, SHORE_TOLERANCE_M), segments.length_m)
+        return beyond[~shapely.contains_xy(self.water, segments.at(beyond.mean(axis=1)))]
+
+    def _unsafe(self, segments: _Segments, outside: FloatArray) -> FloatArray:
+        distance_m = SAFETY_SHARE * self.safety_m
+        if distance_m <= SHORE_TOLERANCE_M:
+            return outside
+        return _merged(np.vstack([outside, self._near(segments, distance_m)]))
+
+    def _near(self, segments: _Segments, distance_m: float) -> FloatArray:
+        """Stretches of a path that are nearer to the shore than a distance."""
+        found = [np.empty((0, 2))]
+        # In parts, since a path that is one tangle along the shore has pairs by the square of its length.
+        for first in range(0, len(segments.lines), _CHUNK):
+            lines = segments.lines[first : first + _CHUNK]
+            segment, run = self._runs.query(lines, predicate="dwithin", distance=distance_m)
+            near, back = np.unique(run, return_inverse=True)
+            bands = shapely.buffer(self._runs.geometries[near], distance_m, quad_segs=QUAD_SEGS)
+            parts, pair = shapely.get_parts(shapely.intersection(lines[segment], bands[back]), return_index=True)
+            found.append(segments.stretches(parts, first + segment[pair]))
+        return _merged(np.vstack(found))
+
+    def _leg_lengths(self, path: LineString, unsafe: FloatArray) -> tuple[float, float]:
+        """How far a path's first and its last leg reach.
+
+        Of a path that never comes to open water, only what begins and what ends it.
+        """
+        out_m = self._reach_m(path, unsafe)
+        home_m = self._reach_m(path.reverse(), path.length - unsafe[::-1, ::-1])
+        if out_m + home_m < path.length:
+            return out_m, home_m
+        begins, ends = unsafe[:, 0] <= ROUNDING_M, unsafe[:, 1] >= path.length - ROUNDING_M
+        if (begins & ends).any():
+            return 0.0, 0.0
+        return float(unsafe[begins, 1].sum()), float((path.length - unsafe[ends, 0]).sum())
+
+    def _reach_m(self, path: LineString, unsafe: FloatArray) -> float:
+        """How far the leg at a path's start reaches: to the first safe stretch in a basin."""
+        reach_m = 0.0
+        open_m = max(OPEN_SHARE * self.safety_m, SHORE_TOLERANCE_M)
+        for start_m, end_m in unsafe.tolist():
+            if start_m - reach_m > open_m and self._is_basin(path, reach_m, start_m):
+                break
+            reach_m = end_m
+        return reach_m
+
+    def _is_basin(self, path: LineString, start_m: float, end_m: float) -> bool:
+        """Whether a safe stretch of a path lies in a basin, as the planner understands it."""
+        if self.safety_m == 0.0:
+            return True
+        stretch = substring(path, start_m, min(end_m, start_m + LOOK_SHARE * self.safety_m))
+        near_m = 2.0 * (BASIN_SHARE - SAFETY_SHARE) * self.safety_m
+        return bool(shapely.dwithin(self._basins_beside(stretch), stretch, near_m).any())
+
+    def _basins_beside(self, way: BaseGeometry) -> Geometries:
+        """What is certainly free water near a way, those parts of it that are basins."""
+        distance_m = BASIN_SHARE * self.safety_m
+        beside = way.buffer(OPEN_SHARE * self.safety_m)
+        near = self._runs.query(beside, predicate="dwithin", distance=distance_m)
+        bands = shapely.buffer(self._runs.geometries[near], distance_m, quad_segs=QUAD_SEGS)
+        free = shapely.get_parts(beside.intersection(self.water).difference(shapely.union_all(bands)))
+        return free[[is_basin(part, self.safety_m, self.least_width_m) for part in free]]
+
+    def _leg(self, end: _End, path: LineString, outside: FloatArray, unsafe: FloatArray) -> Leg:
+        """A leg, and what its place makes necessary."""
+        water = self._parts[np.argmin(shapely.distance(self._parts, path.interpolate(end.open_m)))]
+        unsafe_m, ashore_m = _length_m(unsafe), float(water.distance(Point(end.place)))
+        direct_m = direct_leg_m(self.safety_m, ashore_m)
+        return Leg(
+            unsafe_m=unsafe_m,
+            ashore_m=_length_m(outside),
+            least_ashore_m=self._least_ashore_m(Point(end.place)),
+            most_unsafe_m=direct_m if unsafe_m <= direct_m else direct_m + DETOUR * self._shortest_m(end, path),
+        )
+
+    def _least_ashore_m(self, place: Point) -> float:
+        """How far a vehicle is carried over land: from a place ashore straight to the nearest water, whatever its
+        room, and from one in the water, however narrow, not at all.
+        """
+        nearest = self._parts[np.argmin(shapely.distance(self._parts, place))]
+        way = shapely.shortest_line(place, nearest)
+        if way.length <= ROUNDING_M:
+            return 0.0
+        land = shapely.get_parts(way.difference(self.water))
+        return float(shapely.length(land[shapely.distance(land, place) <= ROUNDING_M]).sum())
+
+    def _shortest_m(self, end: _End, path: LineString) -> float:
+        """The shortest way from a place to open water, looked for beside a leg, in metres.
+
+        Open water is where the leg ends, and what it passes on its way there.
+        """
+        way = substring(path, *end.stretch)
+        parts = shapely.get_parts(way.buffer(OPEN_SHARE * self.safety_m).intersection(self.water))
+        water = parts[np.argmin(shapely.distance(parts, path.interpolate(end.open_m)))]
+        start = shapely.get_coordinates(shapely.shortest_line(water, Point(end.place)))[0]
+        basins = self._basins_beside(way)
+        open_end = path.interpolate(end.open_m).buffer(self.safety_m)
+        goal = shapely.union_all([*basins, open_end]).intersection(water)
+        if goal.is_empty or goal.covers(Point(start)):
+            return 0.0
+        routes = Routes(water, self.safety_m)
+        route = routes.to_area(start, goal, routes.goals_in(goal))
+        return 0.0 if route is None else float(route.difference(goal).length)
+
+
+@dataclass(frozen=True)
+class _End:
+    """An end of a path: its name and place, where along the path it is, and where open water begins."""
+
+    name: str
+    place: Place
+    at_m: float
+    open_m: float
+
+    @property
+    def stretch(self) -> tuple[float, float]:
+        """The leg, from and to metres along the path."""
+        return min(self.at_m, self.open_m), max(self.at_m, self.open_m)
+
+
+@dataclass(frozen=True)
+class _Segments:
+    """A path's segments: `lines` (n,), their ends (n, 2, 2), and how far along the path each begins, (n,)."""
+
+    lines: Geometries
+    ends: FloatArray
+    start_m: FloatArray
+    length_m: float
+
+    @classmethod
+    def of(cls, path: LineString) -> _Segments:
+        xy = shapely.get_coordinates(path)
+        ends = np.stack([xy[:-1], xy[1:]], axis=1)
+        ends = ends[(ends[:, 0] != ends[:, 1]).any(axis=1)]
+        length_m = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+        end_m = np.cumsum(length_m)
+        return cls(np.asarray(shapely.linestrings(ends)), ends, end_m - length_m, float(end_m[-1]))
+
+    def at(self, along_m: FloatArray) -> FloatArray:
+        """Places (n, 2) at distances along the path."""
+        segment = np.clip(np.searchsorted(self.start_m, along_m, side="right") - 1, 0, None)
+        start, end = self.ends[segment].transpose(1, 0, 2)
+        step = end - start
+        share = (along_m - self.start_m[segment]) / np.hypot(*step.T)
+        return np.asarray(start + share[:, None] * step)
+
+    def stretches(self, parts: Geometries, segment: np.ndarray) -> FloatArray:
+        """Where along the path parts of its segments begin and end, (n, 2)."""
+        lines = shapely.get_type_id(parts) == shapely.GeometryType.LINESTRING
+        lines &= ~shapely.is_empty(parts)
+        parts, segment = parts[lines], segment[lines]
+        ends = np.stack([shapely.get_coordinates(shapely.get_point(parts, at)) for at in (0, -1)], axis=1)
+        along = np.hypot(*(ends - self.ends[segment, :1]).transpose(2, 0, 1)) + self.start_m[segment, None]
+        return np.asarray(np.sort(along, axis=1))
+
+
+def strays(path: LineString, free: Polygon, launch: Place, recovery: Place) -> list[BaseGeometry]:
+    """The stretches of a path outside a free space that are no legs: they neither begin nor end it."""
+    segments = np.asarray(_Segments.of(path).lines)
+    grown = free.buffer(ROUNDING_M)
+    shapely.prepare(grown)
+    leaving = segments[~shapely.covers(grown, segments)]
+    outside = shapely.get_parts(shapely.line_merge(MultiLineString(list(leaving)).difference(grown)))
+    ends = shapely.points([launch, recovery])
+    is_leg = shapely.dwithin(outside[:, None], ends, ROUNDING_M).any(axis=1)
+    return list(outside[~is_leg & (shapely.length(outside) > ROUNDING_M)])
+
+
+def crossings_of(path: LineString) -> tuple[Fault, ...]:
+    """Where a path meets itself, neighbouring segments aside: nothing, if and only if it is simple.
+
+    One fault: its `metres` are 0, and `count` is the number of pairs of segments that meet. The first and the last
+    segment of a closed path are neighbours. A path that only folds back upon its end counts as one crossing.
+    """
+    if shapely.is_simple(path):
+        return ()
+    lines = _Segments.of(path).lines
+    last = len(lines) - 1
+    tree = STRtree(lines)
+    count, place = 0, shapely.get_coordinates(path)[-1]
+    # In parts, since a path that is one tangle has pairs by the square of its length.
+    for start in range(0, len(lines), _CHUNK):
+        i, j = tree.query(lines[start : start + _CHUNK], predicate="intersects")
+        i += start
+        meets = ~((j <= i + 1) | (path.is_closed & (i == 0) & (j == last)))
+        if count == 0 and meets.any():
+            first = np.flatnonzero(meets)[0]
+            place = shapely.get_coordinates(lines[i[first]].intersection(lines[j[first]]))[0]
+        count += int(np.count_nonzero(meets))
+    return (Fault(rule=Rule.CROSSING, count=max(count, 1), place=(float(place[0]), float(place[1]))),)
+
+
+def _stretch_faults(rule: Rule, path: LineString, stretches: FloatArray) -> Iterator[Fault]:
+    metres = _length_m(stretches)
+    if metres > SHORE_TOLERANCE_M:
+        longest = stretches[np.argmax(stretches[:, 1] - stretches[:, 0])]
+        place = path.interpolate(longest.mean())
+        yield Fault(rule=rule, metres=metres, place=(place.x, place.y))
+
+
+def _leg_faults(end: _End, leg: Leg, path: LineString) -> Iterator[Fault]:
+    middle = path.interpolate(sum(end.stretch) / 2)
+    place = (middle.x, middle.y)
+    over_land_m = leg.ashore_m - leg.least_ashore_m
+    if over_land_m > SHORE_TOLERANCE_M:
+        yield Fault(rule=Rule.OUTSIDE, metres=over_land_m, place=place, leg=end.name)
+    if leg.unsafe_m > leg.most_unsafe_m:
+        yield Fault(rule=Rule.UNSAFE, metres=leg.unsafe_m - leg.most_unsafe_m, place=place, leg=end.name)
+
+
+def _runs_of(ring: FloatArray) -> Geometries:
+    """A closed ring as line strings of a few edges each."""
+    first = np.arange(0, len(ring) - 1, RUN)
+    sizes = np.minimum(first + RUN, len(ring) - 1) - first + 1
+    point = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes - first, sizes)
+    return np.asarray(shapely.linestrings(ring[point], indices=np.repeat(np.arange(len(first)), sizes)))
+
+
+# --------------------------------------------------------------------------- stretches: (n, 2) metres along a path
+
+
+def _merged(stretches: FloatArray) -> FloatArray:
+    """The same stretches in order, those that meet as one."""
+    if len(stretches) == 0:
+        return stretches
+    stretches = stretches[np.argsort(stretches[:, 0], kind="stable")]
+    reach = np.maximum.accumulate(stretches[:, 1])
+    first = np.flatnonzero(np.concatenate([[True], stretches[1:, 0] > reach[:-1]]))
+    return np.column_stack([stretches[first, 0], reach[np.append(first[1:] - 1, len(reach) - 1)]])
+
+
+def _rest(stretches: FloatArray, total_m: float) -> FloatArray:
+    """What ordered stretches leave of a path."""
+    rest = np.column_stack([np.append(0.0, stretches[:, 1]), np.append(stretches[:, 0], total_m)])
+    return np.asarray(rest[rest[:, 1] > rest[:, 0]])
+
+
+def _within(stretches: FloatArray, start_m: float, end_m: float) -> FloatArray:
+    """What of some stretches lies in another."""
+    clipped = np.clip(stretches, start_m, max(start_m, end_m))
+    return np.asarray(clipped[clipped[:, 1] > clipped[:, 0]])
+
+
+def _length_m(stretches: FloatArray) -> float:
+    return float((stretches[:, 1] - stretches[:, 0]).sum())

@@ -1,0 +1,118 @@
+"""How an area of the water is reached from a place outside it: from ashore, from a harbour or up a creek."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely import Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from oxbow.arrays import FloatArray, Place
+from oxbow.errors import Infeasible
+from oxbow.geometry.route.gate_routes import Routes
+from oxbow.tolerances import ON_SHORE_M, ROUNDING_M
+
+__all__ = ["Landing", "leg_routes", "way_to"]
+
+DETAIL = 4.0
+"""Gates of narrow water stand no farther apart than so many times the distance from free space to the shore."""
+
+MOST_GATES = 20_000
+"""Of a long shore, gates stand so much farther apart that there are at most about so many."""
+
+
+@dataclass(frozen=True)
+class Landing:
+    """Where a vehicle takes to the water.
+
+    Parameters
+    ----------
+    place
+        Where it stands: in the water, on its shore or ashore.
+    berth
+        The nearest place of the water: the same, where it stands in the water.
+    """
+
+    place: Place
+    berth: Place
+
+    @classmethod
+    def of(cls, place: Place, water: BaseGeometry) -> Landing:
+        """Where a vehicle at a place takes to the water."""
+        point = Point(place)
+        if shapely.dwithin(water, point, 0.0):
+            return cls(place, place)
+        x, y = shapely.get_coordinates(shapely.shortest_line(water, point))[0].tolist()
+        return cls(place, (x, y))
+
+    @property
+    def is_ashore(self) -> bool:
+        """Whether there is land to cross."""
+        return self.land_m > 0.0
+
+    @property
+    def land_m(self) -> float:
+        """Metres over land, straight to the berth; none for a place on the shore."""
+        return 0.0 if self._distance_m <= ON_SHORE_M else self._distance_m
+
+    @property
+    def off_shore_m(self) -> float:
+        """How far a place on the shore is from the water: by a hair, or by rounding."""
+        return self._distance_m - self.land_m
+
+    @property
+    def _distance_m(self) -> float:
+        return float(np.hypot(*np.subtract(self.place, self.berth)))
+
+    def onward(self, way: FloatArray) -> FloatArray:
+        """A way (n, 2) that begins at the berth, from the place on."""
+        return np.vstack([self.place, way if self.is_ashore else way[1:]])
+
+
+def leg_routes(free: BaseGeometry, water: Polygon) -> Routes:
+    """Routes for legs to the free space: fine enough that none begins down a dead end of the creek it leaves.
+
+    Where water is narrower than twice the safety distance, gates stand as close as about twice that width.
+    """
+    clearance_m = float(free.boundary.distance(water.boundary))
+    if clearance_m <= ROUNDING_M:
+        return Routes(water)
+    return Routes(water, max(DETAIL * clearance_m, water.length / MOST_GATES))
+
+
+def way_to(area: BaseGeometry, routes: Routes, place: Place) -> FloatArray:
+    """The way from a place to where it first meets an area, shape (n, 2).
+
+    From ashore straight to the nearest place of the water, and on as from there. In the water straight to the
+    nearest place of the area, where that keeps to the water; else along its middle.
+
+    Parameters
+    ----------
+    area
+        Where to, in the water; parts of it may lie apart.
+    routes
+        Routes through the water.
+    place
+        Where from, outside the area or in it.
+
+    Raises
+    ------
+    Infeasible
+        No water leads from the place to the area.
+    """
+    landing = Landing.of(place, routes.water)
+    return landing.onward(_way_afloat(area, routes, landing.berth))
+
+
+def _way_afloat(area: BaseGeometry, routes: Routes, berth: Place) -> FloatArray:
+    point = Point(berth)
+    straight = shapely.shortest_line(point, area)
+    if straight.difference(routes.water).length <= ROUNDING_M:
+        return np.asarray(shapely.get_coordinates(straight))
+    route = routes.to_area(np.array(berth), area, routes.goals_in(area))
+    if route is None:
+        raise Infeasible("lies in water from which no way leads to the free space", "LaunchPoint")
+    outside = shapely.get_parts(route.difference(area))
+    return np.asarray(shapely.get_coordinates(outside[np.argmin(shapely.distance(outside, point))]))

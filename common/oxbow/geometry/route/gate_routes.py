@@ -1,0 +1,193 @@
+"""Routes through the water along the middle of its triangulation.
+
+The network is that of the gates between triangles (`oxbow.geometry.route.channel`): it is connected wherever the
+water is, however narrow, never touches the shore, and runs along the middle of narrow arms. A `Router` leads to a
+place; these routes lead to whatever place of an area is nearest, and keep to the middles of the gates.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+import shapely
+from scipy.sparse import csr_array
+from shapely import LineString, MultiPolygon, Polygon, STRtree
+from shapely.geometry.base import BaseGeometry
+
+from oxbow.arrays import FloatArray, Indices
+from oxbow.errors import Internal
+from oxbow.geometry.route.channel import Gates
+from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.route.search import Arcs, WaysTo, cheapest_ways, cheapest_ways_to
+
+__all__ = ["Inward", "Routes", "taut"]
+
+TAUT_POINTS = 200
+"""Into how many steps a route is divided before it is pulled tight."""
+
+
+class Routes:
+    """Routes inside one water.
+
+    Parameters
+    ----------
+    water
+        Where routes may run.
+    detail_m
+        The shore is divided into edges no longer than this, so that gates stand about as close.
+    """
+
+    def __init__(self, water: Polygon | MultiPolygon, detail_m: float = math.inf) -> None:
+        self.water = water
+        self.detail_m = detail_m
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """The water in triangles, its shore in edges no longer than the detail."""
+        return Mesh.of(self.water, detail_m=self.detail_m)
+
+    @cached_property
+    def _gates(self) -> Gates:
+        return Gates(self.mesh)
+
+    @cached_property
+    def _graph(self) -> csr_array[np.float64]:
+        return self._gates.arcs.graph(len(self._gates.places))
+
+    def goals_in(self, area: BaseGeometry) -> Indices:
+        """The gates whose middles lie inside an area."""
+        shapely.prepare(area)
+        inside = shapely.contains_xy(area, self._gates.places)
+        return np.flatnonzero(inside & (self._gates.mesh.twins >= 0))
+
+    @cached_property
+    def _middles(self) -> STRtree:
+        return STRtree(np.asarray(shapely.points(self._gates.places)))
+
+    def goals_near(self, line: LineString, distance_m: float) -> Indices:
+        """The gates whose middles lie no farther from a line."""
+        near = np.sort(self._middles.query(line, predicate="dwithin", distance=distance_m))
+        return np.asarray(near[self._gates.mesh.twins[near] >= 0])
+
+    def into(self, area: BaseGeometry, goals: Indices) -> Inward:
+        """The shortest routes from everywhere into an area, for many at once; else as `to_area`."""
+        places = self._gates.places
+        if len(goals):
+            return Inward(places, cheapest_ways_to(self._graph, goals), self._gates_from)
+        end = shapely.get_coordinates(area.representative_point())
+        around, goal = self._triangle_at(end), len(places)
+        # The area's point becomes a place of the network, so that the step to it counts in the search.
+        last = self._gates.mesh.twins[self._gates_out_of(around)]
+        steps = Arcs(last, np.full(len(last), goal), np.hypot(*(places[last] - end).T))
+        ways = cheapest_ways_to((self._gates.arcs + steps).graph(goal + 1), np.array([goal]))
+
+        def from_place(start: FloatArray) -> Indices:
+            return np.array([goal]) if self._triangle_at(start) == around else self._gates_from(start)
+
+        return Inward(np.vstack([places, end]), ways, from_place)
+
+    def to_area(self, start: FloatArray, area: BaseGeometry, goals: Indices) -> LineString | None:
+        """The shortest route from a point of the water into an area; None if none leads there.
+
+        `goals` are the area's `goals_in`; an area too small to hold any is entered at a point of its own.
+        """
+        if len(goals) == 0:
+            return LineString(self.between(start, shapely.get_coordinates(area.representative_point())[0]))
+        way = self._way(start, goals)
+        return None if way is None else LineString(np.vstack([start, way]))
+
+    def between(self, start: FloatArray, goal: FloatArray) -> FloatArray:
+        """The shortest route over middles of gates between two points of the water, shape (n, 2), with both."""
+        triangle = self._triangle_at(goal)
+        if self._triangle_at(start) == triangle:
+            return np.vstack([start, goal])
+        way = self._way(start, self._gates.mesh.twins[self._gates_out_of(triangle)], goal)
+        if way is None:
+            raise Internal(f"no way inside the region from {start} to {goal}", "routes")
+        return np.vstack([start, way, goal])
+
+    def _triangle_at(self, place: FloatArray) -> int:
+        return int(self._gates.mesh.located(np.atleast_2d(place))[0])
+
+    def _gates_from(self, place: FloatArray) -> Indices:
+        return self._gates_out_of(self._triangle_at(place))
+
+    def _gates_out_of(self, triangle: int) -> Indices:
+        sides = 3 * triangle + np.arange(3)
+        return np.asarray(sides[self._gates.mesh.twins[sides] >= 0])
+
+    def _way(self, start: FloatArray, goals: Indices, onward: FloatArray | None = None) -> FloatArray | None:
+        """Middles of gates on the shortest way from a place to one of some gates, and from there onward."""
+        places, first = self._gates.places, self._gates_from(start)
+        if len(first) == 0 or len(goals) == 0:
+            return None
+        ways = cheapest_ways(self._graph, first)
+        length_m = np.hypot(*(places[first] - start).T)[:, None] + ways.costs[:, goals]
+        if onward is not None:
+            length_m += np.hypot(*(places[goals] - onward).T)
+        rank, last = np.unravel_index(np.argmin(length_m), length_m.shape)
+        if not np.isfinite(length_m[rank, last]):
+            return None
+        return np.asarray(places[ways.way(int(rank), int(goals[last]))])
+
+
+class Inward:
+    """Routes from many places into one area, of which each ends where it comes upon one before it.
+
+    Parameters
+    ----------
+    places
+        Those of the network, shape (n, 2), in metres.
+    ways
+        From each of them to the area.
+    first
+        The numbers of the places that a straight step leads to from anywhere in the water.
+    """
+
+    def __init__(self, places: FloatArray, ways: WaysTo, first: Callable[[FloatArray], Indices]) -> None:
+        self._places = places
+        self._ways = ways
+        self._first = first
+        self._passed = np.zeros(len(places), dtype=bool)
+
+    def route(self, start: FloatArray, unused_m: float = math.inf) -> LineString | None:
+        """The route from a place; None if none leads there.
+
+        Parameters
+        ----------
+        start
+            A place of the water.
+        unused_m
+            How much of its beginning no later route may end on; by default, none ends on it at all.
+        """
+        first = self._first(start)
+        length_m = np.hypot(*(self._places[first] - start).T) + self._ways.costs[first]
+        if not np.isfinite(length_m).any():
+            return None
+        way = np.array(self._ways.way(int(first[np.argmin(length_m)])))
+        met = np.flatnonzero(self._passed[way])
+        points = np.vstack([start, self._places[way[: met[0] + 1] if len(met) else way]])
+        along_m = np.cumsum(np.hypot(*np.diff(points, axis=0).T))
+        self._passed[way[: len(along_m)][along_m > unused_m]] = True
+        return LineString(points)
+
+
+def taut(route: LineString, water: BaseGeometry) -> LineString:
+    """A route pulled tight: from each vertex straight on to the farthest one that the water lets see.
+
+    Backward and forward, over points spread along the route, so that bends shrink to the corners of the shore.
+    Unlike a shortest route through that water, it may begin outside, and stays as it is where the water ends.
+    """
+    for _ in range(2):
+        points = shapely.get_coordinates(shapely.segmentize(route, route.length / TAUT_POINTS))[::-1]
+        kept = [0]
+        while kept[-1] < len(points) - 1:
+            ahead = points[kept[-1] + 1 :]
+            sights = shapely.linestrings(np.stack([np.broadcast_to(points[kept[-1]], ahead.shape), ahead], axis=1))
+            seen = np.flatnonzero(shapely.covers(water, sights))
+            kept.append(kept[-1] + 1 + int(seen[-1] if len(seen) else 0))
+        route = LineString(points[kept])
+    return route

@@ -1,0 +1,182 @@
+"""Local changes of a triangulation.
+
+M. Kallmann, H. Bieri and D. Thalmann (2003), *Fully dynamic constrained Delaunay triangulations*: only triangles
+that a change affects are made anew. They insert vertices and edges one by one; here the triangles that meet the
+change are taken out as one cavity, GEOS triangulates it, and from its border C. L. Lawson's flips (1977) go on
+outwards until all is constrained Delaunay again.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import shapely
+from shapely import STRtree
+from shapely.geometry.base import BaseGeometry
+
+from oxbow.arrays import FloatArray, Geometries, Indices, Mask
+from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.triangles import following, paired, triangulated, twins_of
+from oxbow.tolerances import ROUNDING_M
+
+__all__ = ["GRID_M", "Site", "retriangulated"]
+
+GRID_M = 2.0**-20
+"""All vertices lie on a grid this fine (about 1 micrometre), so that what is cut out fits again when put back."""
+
+DELAUNAY_SLACK = 1e-12
+"""How far from one circle four vertices must be for a flip, as the sine of an angle."""
+
+
+class Site(Protocol):
+    """What the water is to be after a change."""
+
+    def shores_near(self, areas: Geometries) -> Geometries:
+        """All lines along which water may end that come within rounding of areas; some may run over land."""
+
+    def is_water(self, places: FloatArray) -> Mask:
+        """Whether places, shape (n, 2), are in the water."""
+
+
+def retriangulated(mesh: Mesh, changed: BaseGeometry, site: Site) -> Mesh:
+    """The mesh after a change.
+
+    Parameters
+    ----------
+    mesh
+        The water before, on the grid.
+    changed
+        Where water has come or gone; on the grid.
+    site
+        The water afterwards, which differs only there.
+    """
+    cavity = _touched(mesh, changed)
+    while True:
+        faces = _hole(mesh, cavity, changed, site)
+        splice, loose = _spliced(mesh, cavity, faces)
+        if not len(loose):
+            return splice.legalised()
+        # A new vertex fell on the cavity's border: the triangles beyond have to take it in.
+        cavity = np.union1d(cavity, loose)
+
+
+def _hole(mesh: Mesh, cavity: Indices, changed: BaseGeometry, site: Site) -> Geometries:
+    """The water of a cavity after the change, as polygons.
+
+    All lines are noded together, the shores as they were given and not as earlier changes cut them: what
+    rounding did to a shore is undone with the obstacle that was there.
+    """
+    pieces = np.asarray(shapely.polygons(mesh.corners[cavity]))
+    border = mesh.twins.reshape(-1, 3)[cavity].ravel()
+    border = border[(border >= 0) & ~np.isin(border // 3, cavity)]
+    ends = np.stack([mesh.tails[border], mesh.heads[border]], axis=1)
+    parts = shapely.get_parts(shapely.geometrycollections([changed, *pieces]))
+    lines = np.concatenate([shapely.linestrings(ends), site.shores_near(parts)])
+    noded = shapely.union_all(lines, grid_size=GRID_M)
+    faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
+    middles = shapely.point_on_surface(faces)
+    inside = np.zeros(len(faces), dtype=np.bool_)
+    inside[STRtree(middles).query(parts, predicate="intersects")[1]] = True
+    inside[inside] = site.is_water(shapely.get_coordinates(middles[inside]))
+    return np.asarray(faces[inside])
+
+
+def _touched(mesh: Mesh, area: BaseGeometry) -> Indices:
+    """The triangles that meet an area, or did before vertices on its outline were rounded."""
+    low, high = np.reshape(area.bounds, (2, 2)) + np.array([[-ROUNDING_M], [ROUNDING_M]])
+    # On which sides of the area's box a vertex lies, as in D. Cohen and I. Sutherland's clipping.
+    outside = np.hstack([mesh.points < low, mesh.points > high]) @ np.array([1, 2, 4, 8], dtype=np.uint8)
+    near = np.flatnonzero(np.bitwise_and.reduce(outside[mesh.triangles.T]) == 0)
+    triangles = shapely.polygons(mesh.corners[near])
+    return np.asarray(near[shapely.dwithin(area, triangles, ROUNDING_M)])
+
+
+def _spliced(mesh: Mesh, cavity: Indices, faces: Geometries) -> tuple[_Splice, Indices]:
+    """The mesh with another triangulation in a cavity, and the triangles outside to which that does not fit."""
+    places, fresh = triangulated(faces)
+    points, number = _numbered(mesh, cavity, places)
+    kept = np.ones(len(mesh.triangles), dtype=np.bool_)
+    kept[cavity] = False
+    rank = np.where(kept, np.cumsum(kept) - 1, -1)
+    border = mesh.twins.reshape(-1, 3)[cavity].ravel()
+    border = border[(border >= 0) & kept[border // 3]]
+    first = 3 * np.count_nonzero(kept)
+    fresh_twins = twins_of(fresh)
+    triangles = np.vstack([mesh.triangles[kept], number[fresh]])
+    kept_twins = _renumbered(mesh.twins[np.repeat(kept, 3)], rank)
+    twins = np.concatenate([kept_twins, np.where(fresh_twins >= 0, fresh_twins + first, -1)])
+    outer = _renumbered(border, rank)
+    open_sides = np.concatenate([outer, first + np.flatnonzero(fresh_twins < 0)])
+    one, other = paired(triangles.ravel()[open_sides], triangles.ravel()[following(open_sides)])
+    one, other = open_sides[one], open_sides[other]
+    twins[one], twins[other] = other, one
+    loose = border[twins[outer] < 0] // 3
+    return _Splice(points, triangles, twins, outer), loose
+
+
+def _numbered(mesh: Mesh, cavity: Indices, places: FloatArray) -> tuple[FloatArray, Indices]:
+    """All vertices, and the numbers of places among them: those that the cavity had keep theirs."""
+    old = np.unique(mesh.triangles[cavity])
+    number = {place: int(vertex) for place, vertex in zip(map(tuple, mesh.points[old].tolist()), old, strict=True)}
+    new = [place for place in map(tuple, places.tolist()) if place not in number]
+    number |= {place: len(mesh.points) + rank for rank, place in enumerate(new)}
+    points = np.vstack([mesh.points, np.reshape(new, (-1, 2))])
+    return points, np.array([number[place] for place in map(tuple, places.tolist())], dtype=np.intp)
+
+
+def _renumbered(sides: Indices, rank: Indices) -> Indices:
+    """Sides after their triangles have new numbers; -1 where the triangle is gone or the side was shore."""
+    triangle = rank[sides // 3]
+    return np.where((sides >= 0) & (triangle >= 0), 3 * triangle + sides % 3, -1)
+
+
+@dataclass(frozen=True)
+class _Splice:
+    """A triangulation that may not be Delaunay at some sides."""
+
+    points: FloatArray
+    triangles: Indices
+    twins: Indices
+    suspects: Indices
+
+    def legalised(self) -> Mesh:
+        """The constrained Delaunay triangulation that flips lead to; without vertices that no triangle has."""
+        pending = self.suspects.tolist()
+        while pending:
+            side = pending.pop()
+            twin = int(self.twins[side])
+            if twin >= 0 and not self._is_delaunay(side, twin):
+                pending += self._flip(side, twin)
+        used = np.zeros(len(self.points), dtype=np.bool_)
+        used[self.triangles] = True
+        return Mesh(self.points[used], (np.cumsum(used) - 1)[self.triangles], self.twins)
+
+    def _is_delaunay(self, side: int, twin: int) -> bool:
+        """Whether the angles opposite a side and its twin come to half a turn at most."""
+        sines, cosines = [], []
+        for t, j in (divmod(side, 3), divmod(twin, 3)):
+            (ax, ay), (bx, by), (cx, cy) = self.points[self.triangles[t, [j, j - 2, j - 1]]].tolist()
+            scale = math.hypot(ax - cx, ay - cy) * math.hypot(bx - cx, by - cy)
+            sines.append(((ax - cx) * (by - cy) - (ay - cy) * (bx - cx)) / scale)
+            cosines.append(((ax - cx) * (bx - cx) + (ay - cy) * (by - cy)) / scale)
+        sine: float = sines[0] * cosines[1] + cosines[0] * sines[1]
+        return sine >= -DELAUNAY_SLACK
+
+    def _flip(self, side: int, twin: int) -> list[int]:
+        """Exchange the diagonal of two triangles' quadrangle; the four sides round it."""
+        (t, j), (u, k) = divmod(side, 3), divmod(twin, 3)
+        a, b, c = self.triangles[t, [j, j - 2, j - 1]].tolist()
+        d = int(self.triangles[u, k - 1])
+        twins = self.twins.reshape(-1, 3)
+        bc, ca = twins[t, j - 2], twins[t, j - 1]
+        ad, db = twins[u, k - 2], twins[u, k - 1]
+        self.triangles[t], self.triangles[u] = (a, d, c), (d, b, c)
+        twins[t], twins[u] = (ad, 3 * u + 2, ca), (db, bc, 3 * t + 1)
+        around = [3 * t, 3 * t + 2, 3 * u, 3 * u + 1]
+        for outside, inside in zip((ad, ca, db, bc), around, strict=True):
+            if outside >= 0:
+                self.twins[outside] = inside
+        return around

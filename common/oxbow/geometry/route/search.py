@@ -1,0 +1,98 @@
+"""Cheapest ways over a network of places (E. W. Dijkstra 1959, through SciPy)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from oxbow.arrays import FloatArray, Indices
+from oxbow.geometry.route.danger import Danger
+
+__all__ = ["Arcs", "Ways", "WaysTo", "cheapest_ways", "cheapest_ways_to", "distinct"]
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """One-way connections of numbered places, each pair at most once, with costs in metres."""
+
+    tails: Indices
+    heads: Indices
+    costs: FloatArray
+
+    @classmethod
+    def one_way(cls, places: FloatArray, tails: Indices, heads: Indices, danger: Danger) -> Arcs:
+        """Straight edges between places, shape (n, 2)."""
+        return cls(tails, heads, danger.costs(places[tails], places[heads]))
+
+    @classmethod
+    def both_ways(cls, places: FloatArray, pairs: Indices, danger: Danger) -> Arcs:
+        """Straight edges between pairs of places, shape (m, 2), there and back; a pair may occur repeatedly."""
+        low, high = distinct(pairs.min(axis=1), pairs.max(axis=1))
+        low, high = low[low < high], high[low < high]
+        return cls.one_way(places, np.concatenate([low, high]), np.concatenate([high, low]), danger)
+
+    def graph(self, count: int) -> csr_array[np.float64]:
+        """The graph over `count` places."""
+        return coo_array((self.costs, (self.tails, self.heads)), shape=(count, count)).tocsr()
+
+    def __add__(self, other: Arcs) -> Arcs:
+        return Arcs(
+            np.concatenate([self.tails, other.tails]),
+            np.concatenate([self.heads, other.heads]),
+            np.concatenate([self.costs, other.costs]),
+        )
+
+
+@dataclass(frozen=True)
+class Ways:
+    """The cheapest ways from some sources to all places: their costs (inf where none leads), their last steps."""
+
+    costs: FloatArray
+    previous: Indices
+
+    def way(self, source: int, place: int) -> list[int]:
+        """The places on the way from a source, by its rank among the sources, to a place; both included."""
+        return list(self._backwards(source, place))[::-1]
+
+    def _backwards(self, source: int, place: int) -> Iterator[int]:
+        while place >= 0:
+            yield place
+            place = int(self.previous[source, place])
+
+
+def cheapest_ways(graph: csr_array[np.float64], sources: Indices) -> Ways:
+    """Search a graph (`Arcs.graph`) from some of its places."""
+    costs, previous = dijkstra(graph, indices=sources, return_predecessors=True)
+    return Ways(costs, previous.astype(np.intp))
+
+
+@dataclass(frozen=True)
+class WaysTo:
+    """The cheapest ways from all places to the nearest of some goals: costs (inf where none leads), next steps."""
+
+    costs: FloatArray
+    following: Indices
+
+    def way(self, place: int) -> list[int]:
+        """The places on the way from a place to its goal; both included."""
+        way = [place]
+        while (place := int(self.following[place])) >= 0:
+            way.append(place)
+        return way
+
+
+def cheapest_ways_to(graph: csr_array[np.float64], goals: Indices) -> WaysTo:
+    """Search a graph (`Arcs.graph`) backwards, from some of its places to all: once, however many set out."""
+    costs, following, _ = dijkstra(graph.T.tocsr(), indices=goals, min_only=True, return_predecessors=True)
+    return WaysTo(costs, following.astype(np.intp))
+
+
+def distinct(tails: Indices, heads: Indices) -> tuple[Indices, Indices]:
+    """Pairs, each once."""
+    width = int(heads.max(initial=0)) + 1
+    tails, heads = np.divmod(np.unique(tails * width + heads), width)
+    return tails, heads

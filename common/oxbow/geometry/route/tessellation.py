@@ -1,0 +1,190 @@
+"""Routes over a lattice of equilateral triangles with the obstacles' vertices in it.
+
+M. Innocenti, L. Pollini and A. Bracci (2006), section 2.2, way c: lattice vertices in the water, joined where
+no shore lies between; each obstacle vertex joined to lattice vertices near it. Along the sides of triangles a way
+is up to 15.5 % longer than the straight line, with "cuts" 1.5 %: cuts to the second and third ring of neighbours
+make 24 directions, at most 19.1 degrees apart, and 1 / cos(19.1 / 2 degrees) = 1.014. The way found is then
+reduced: to the cheapest along the lines of sight between its own vertices.
+
+Departure: obstacle vertices are also joined along the sides of a constrained Delaunay triangulation, so that arms
+too narrow for the lattice are not lost.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from oxbow.arrays import FloatArray, Indices
+from oxbow.errors import InvalidMission
+from oxbow.geometry.route.danger import NO_DANGER, Danger
+from oxbow.geometry.route.mesh import Mesh, Touches
+from oxbow.geometry.route.network import Ends, Links, Way
+from oxbow.geometry.route.search import Arcs, cheapest_ways
+from oxbow.geometry.route.sights import sights
+from oxbow.geometry.triangles import following
+from oxbow.tolerances import ROUNDING_M
+
+__all__ = ["RINGS", "Tessellation", "lattice"]
+
+SIDES_ACROSS = 60
+"""How many sides of the lattice fit the longer side of the water's box, where nothing else is asked for."""
+
+MOST_SIDES_ACROSS = 1_000
+"""How many may be asked for: the lattice fills the box."""
+
+RINGS = (
+    ((1, 0), (0, 1), (-1, 1)),
+    ((1, 1), (-1, 2), (-2, 1)),
+    ((2, 1), (1, 2), (-1, 3), (-2, 3), (-3, 2), (-3, 1)),
+)
+"""Half of the neighbours at distances 1, sqrt(3) and sqrt(7), in steps along the row and to the row above (leaning
+right); the other half are their opposites."""
+
+REACH = math.sqrt(3.0)
+"""In sides: obstacle vertices and the ends of routes are joined to the lattice this far away."""
+
+SHORT = 1e-9
+"""A line to a vertex of the shore is tested without this share of its end."""
+
+
+def lattice(
+    low: FloatArray, high: FloatArray, side_m: float, rings: tuple[tuple[tuple[int, int], ...], ...] = RINGS
+) -> tuple[FloatArray, Indices]:
+    """A lattice of equilateral triangles over a rectangle, and the pairs of neighbours on some rings.
+
+    Parameters
+    ----------
+    low, high : ndarray, shape (2,)
+        Opposite corners of the rectangle, in metres.
+    side_m
+        Of the triangles.
+    rings
+        Which neighbours are joined.
+
+    Returns
+    -------
+    places : ndarray, shape (n, 2)
+    pairs : ndarray of int, shape (m, 2)
+    """
+    rows = math.ceil((high[1] - low[1]) / (side_m * math.sqrt(0.75))) + 1
+    columns = math.ceil((high[0] - low[0]) / side_m) + 2
+    row, column = np.divmod(np.arange(rows * columns), columns)
+    places = low + side_m * np.column_stack([column - 0.5 * (row % 2), row * math.sqrt(0.75)])
+    pairs = []
+    for along, up in (step for ring in rings for step in ring):
+        # Odd rows lie half a side to the left.
+        above = row + up
+        beside = column + along + (above % 2 - row % 2 + up) // 2
+        inside = (above < rows) & (beside >= 0) & (beside < columns)
+        pairs.append(np.column_stack([np.arange(len(row)), above * columns + beside])[inside])
+    return places, np.vstack(pairs)
+
+
+class Tessellation:
+    """The network of the water's vertices and a lattice, and how ways over it are reduced.
+
+    Parameters
+    ----------
+    mesh
+        The water; zones' outlines are among its sides.
+    danger
+        What danger there is.
+    side_m
+        Of the lattice's triangles; by default a sixtieth of the longer side of the water's box.
+
+    Raises
+    ------
+    InvalidMission
+        `side_m` is not a length, or less than a thousandth of the longer side of the water's box.
+    """
+
+    def __init__(self, mesh: Mesh, danger: Danger = NO_DANGER, *, side_m: float | None = None) -> None:
+        across_m = float(np.ptp(mesh.points, axis=0).max())
+        least_m = across_m / MOST_SIDES_ACROSS
+        if side_m is not None and not least_m <= side_m < math.inf:
+            raise InvalidMission(f"is {side_m!r}; expected a finite number >= {least_m:.3g}", where="side_m")
+        self.mesh = mesh
+        self.danger = danger
+        self.side_m = across_m / SIDES_ACROSS if side_m is None else side_m
+
+    @cached_property
+    def places(self) -> FloatArray:
+        """See `Network.places`: the vertices, once for each sector, then the lattice."""
+        return np.vstack([self.mesh.sector_places, self._lattice.places])
+
+    @cached_property
+    def arcs(self) -> Arcs:
+        """See `Network.arcs`: along the sides of triangles, from vertices to the lattice, and within that."""
+        vertices, sectors = self.mesh.sector_places, self.mesh.sectors
+        along_sides = np.column_stack([sectors, sectors[following(np.arange(len(sectors)))]])
+        vertex, near = self._near(vertices)
+        # Where shores touch, a line that ends there does not tell from which side.
+        alone = KDTree(vertices).query_ball_point(vertices, ROUNDING_M, return_length=True) == 1
+        links = np.column_stack([vertex, near])[alone[vertex]]
+        pairs = np.vstack([along_sides, links, len(vertices) + self._lattice.pairs])
+        return Arcs.both_ways(self.places, pairs, self.danger)
+
+    def links(self, ends: Ends) -> Links:
+        """See `Network.links`: to the lattice near, and to the corners of the triangles that ends touch."""
+        (near_end, near), (end, corner) = self._near(ends.places), ends.at.sides()
+        beside = np.concatenate([near, self.mesh.sectors[corner]])
+        return Links(np.concatenate([near_end, end]), beside, beside, *ends.at.companions())
+
+    def reduced(self, way: Way) -> FloatArray:
+        """The cheapest polyline along the lines of sight between the places of a way."""
+        places = np.vstack([way.start, self.places[way.nodes], way.goal])
+        ends, inner = way.ends.at, self._touches.among(way.nodes)
+        last = len(places) - 1
+        touches = Touches(last * ends.place, ends.triangle) + Touches(1 + inner.place, inner.triangle)
+        nothing = np.zeros(len(self.mesh.tails), dtype=np.bool_)
+        seen = sights(self.mesh, places, touches, places, touches, nothing)
+        pairs = np.column_stack([seen.place_eyes, seen.places])
+        arcs = Arcs.both_ways(places, pairs, self.danger)
+        ways = cheapest_ways(arcs.graph(len(places)), np.array([0]))
+        return np.asarray(places[ways.way(0, last)])
+
+    @cached_property
+    def _lattice(self) -> _Lattice:
+        """The lattice in the water."""
+        places, pairs = lattice(self.mesh.points.min(axis=0), self.mesh.points.max(axis=0), self.side_m)
+        touches = self.mesh.holding(places)
+        wet = np.unique(touches.place)
+        rank = np.full(len(places), -1)
+        rank[wet] = np.arange(len(wet))
+        pairs = rank[pairs[(rank[pairs] >= 0).all(axis=1)]]
+        places = places[wet]
+        clear = self.mesh.is_clear(places[pairs[:, 0]], places[pairs[:, 1]])
+        return _Lattice(places, touches.among(wet), pairs[clear])
+
+    @cached_property
+    def _index(self) -> KDTree:
+        return KDTree(self._lattice.places)
+
+    @cached_property
+    def _touches(self) -> Touches:
+        """The triangles that the network's places touch."""
+        sectors, touches = self.mesh.sectors, self._lattice.touches
+        on_lattice = Touches(len(self.mesh.sector_places) + touches.place, touches.triangle)
+        return Touches(sectors, np.arange(len(sectors)) // 3) + on_lattice
+
+    def _near(self, points: FloatArray) -> tuple[Indices, Indices]:
+        """Pairs of a point and a place of the lattice near it with no shore between, but for one at the point."""
+        near = KDTree(points).sparse_distance_matrix(self._index, REACH * self.side_m, output_type="ndarray")
+        owner, place = near["i"], near["j"]
+        from_lattice = self._lattice.places[place]
+        clear = self.mesh.is_clear(from_lattice, points[owner] + SHORT * (from_lattice - points[owner]))
+        return owner[clear], len(self.mesh.sector_places) + place[clear]
+
+
+@dataclass(frozen=True)
+class _Lattice:
+    """Places of the lattice in the water, the triangles that they touch, and pairs that no shore parts."""
+
+    places: FloatArray
+    touches: Touches
+    pairs: Indices

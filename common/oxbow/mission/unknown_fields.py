@@ -1,0 +1,43 @@
+"""Fields of a Mission File without a meaning that look like one with a meaning: a slip of the pen is told."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator, Sequence
+
+import msgspec
+
+from oxbow.mission.danger_zones import GivenDangerZone
+from oxbow.mission.file import FIELD_NAMES, Bloom, Mission
+from oxbow.mission.vehicles import GivenVehicle
+from oxbow.wire.strict_json import json_names
+
+__all__ = ["misspelt"]
+
+ALIKE = 0.75
+"""How much two names have in common, of 1, at least (Ratcliff and Metzener 1988, as `difflib` has it)."""
+
+
+def misspelt(mission: Mission) -> tuple[str, ...]:
+    """A warning for each field that is kept without a meaning, though its name is much like a known one."""
+    bloom = () if mission.bloom is None else (mission.bloom,)
+    warnings = list(_like(mission.extra, FIELD_NAMES, ""))
+    warnings += _in_parts(bloom, Bloom, "Bloom")
+    warnings += _in_parts(mission.vehicles or (), GivenVehicle, "Vehicles[{}]")
+    warnings += _in_parts(mission.danger_zones or (), GivenDangerZone, "DangerZones[{}]")
+    return tuple(warnings)
+
+
+def _in_parts(
+    parts: Sequence[Bloom | GivenVehicle | GivenDangerZone], kind: type[msgspec.Struct], where: str
+) -> Iterator[str]:
+    for index, part in enumerate(parts):
+        yield from _like(part.extra, json_names(kind).values(), f"{where.format(index)}.")
+
+
+def _like(unknown: Iterable[str], known: Iterable[str], prefix: str) -> Iterator[str]:
+    names = {name.lower(): name for name in known}
+    for field in unknown:
+        close = difflib.get_close_matches(field.lower(), names, n=1, cutoff=ALIKE)
+        if close:
+            yield f"{prefix}{field} has no meaning here and is kept as it came; is {names[close[0]]} meant?"

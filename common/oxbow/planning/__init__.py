@@ -1,0 +1,1 @@
+"""From a site to certified paths: the pipeline, and what it checks."""

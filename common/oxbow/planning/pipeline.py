@@ -1,0 +1,280 @@
+"""The flow of one mission, from the Mission File to the plan: read this first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import msgspec
+from shapely import LineString, Polygon
+
+from oxbow.contracts import (
+    ASSIGN,
+    CERTIFY,
+    CONTOUR,
+    DECOMPOSE,
+    PATH,
+    Assignment,
+    AssignRequest,
+    Call,
+    Certificate,
+    CertifyRequest,
+    ContourRequest,
+    DecomposeRequest,
+    Decomposition,
+    FreeSpace,
+    PathPlan,
+    PathRequest,
+    Role,
+    Track,
+)
+from oxbow.contracts.budget import WELL_USED, nominal_spacing_m
+from oxbow.errors import Infeasible, renamed
+from oxbow.geometry.conformance import Shore
+from oxbow.mission.file import Mission, PlanOptions
+from oxbow.planning.approach import Approach, Harbour
+from oxbow.planning.completion import completed
+from oxbow.planning.verification import CheckedCall, require_faultless, require_fit_to_follow
+from oxbow.site.fleet import Member, TeamPlan, VehiclePlan
+from oxbow.site.site import Site
+
+__all__ = ["expected_calls", "plan_mission"]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What every step of a mission works with."""
+
+    mission: Mission
+    options: PlanOptions
+    site: Site
+    space: FreeSpace
+    call: Call
+
+    @cached_property
+    def shore(self) -> Shore:
+        """What paths are judged by before they leave."""
+        return Shore(self.site.water, self.mission.safety_m, self.mission.least_width_m)
+
+    def part(self, member: Member) -> str:
+        """Which part of the mission a vehicle is, where there are several."""
+        return member.vehicle.name if len(self.site.members) > 1 else ""
+
+
+def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: Call) -> Mission:
+    """Plan a mission's nominal paths and certify them (Rendas and Li 2016, section 1.1).
+
+    Masters survey. Slaves treat the hot spots that the prior model tells; where it tells none, they survey too, as
+    far as their own length goes.
+
+    Parameters
+    ----------
+    mission
+        A checked mission.
+    options
+        Method, seed and the like; the defaults of `PlanOptions` where absent.
+    call
+        How the stages are reached.
+
+    Returns
+    -------
+    Mission
+        The mission with its paths and the `Plan` object filled in.
+
+    Raises
+    ------
+    OxbowError
+        Whatever a stage raised: nothing is planned by half. `Internal` where a reply does not belong to its
+        request, or a path breaks a rule of the water: it is not handed out.
+    """
+    options = options or PlanOptions()
+    call = CheckedCall(call)
+    site = Site.of(mission)
+    contour = ContourRequest(
+        outline=site.outline,
+        zones=site.zones,
+        safety_m=mission.safety_m,
+        spacing_m=site.nominal_spacing_m,
+        tolerance_m=options.tolerance_m,
+        places=tuple(site.ends.values()),
+        shore_tolerance_m=mission.shore_tolerance_m,
+        least_width_m=mission.least_width_m,
+    )
+    fields = {f"places[{index}]": field for index, field in enumerate(site.ends)}
+    with renamed(fields | {"least_width_m": "Least_width"}):
+        space = call(CONTOUR, contour)
+    task = Task(mission, options, site, space, call)
+    teams = [
+        treatment(task) if role is Role.SLAVE and site.hot_spots else survey(task, site.team(role))
+        for role in mission.mission_type.roles
+    ]
+    return completed(mission, options, site, task.space, teams)
+
+
+def survey(task: Task, team: Sequence[Member]) -> TeamPlan:
+    """Cover the free space: one vehicle all of it, several a share each."""
+    if len(team) == 1:
+        (member,) = team
+        vehicle = member.vehicle
+        whole = Approach(task.space, vehicle.start, vehicle.recovery)
+        alone = (_covered(task, member, whole, task.site.area_m2),)
+        return TeamPlan(alone, _certified(task, alone))
+    assignment = _shared(task, team)
+    areas = {share.vehicle: share.area for share in assignment.shares}
+    harbour = Harbour(task.space, task.site.nominal_spacing_m)
+    vehicles = tuple(_shared_part(task, member, harbour, areas[member.vehicle.name]) for member in team)
+    return TeamPlan(vehicles, _certified(task, vehicles), assignment)
+
+
+def treatment(task: Task) -> TeamPlan:
+    """Treat the hot spots: a sortie for each slave, as far as its length goes."""
+    team = {member.vehicle.name: member for member in task.site.team(Role.SLAVE)}
+    request = AssignRequest(
+        free=task.space.free,
+        water=task.space.water,
+        vehicles=tuple(member.vehicle for member in team.values()),
+        hot_spots=task.site.hot_spots,
+        swath_m=task.mission.treated_swath_m,
+        danger_zones=task.site.danger_zones,
+        danger_detour_m=task.site.danger_detour_m,
+        seed=task.options.seed,
+    )
+    with renamed({"swath_m": "Swath" if task.mission.swath_m else "Minimal_spatial_rate"}):
+        assignment = task.call(ASSIGN, request)
+    if not assignment.sorties:
+        reasons = "; ".join(f"{left.hot_spot}: {left.reason}" for left in assignment.left)
+        raise Infeasible(f"has no hot spot that can be treated ({reasons})", where="PriorModel")
+    vehicles, further = (
+        tuple(
+            VehiclePlan(member=team[sortie.vehicle], path=sortie.path, hot_spots=sortie.hot_spots)
+            for sortie in sorties
+        )
+        for sorties in (assignment.sorties, assignment.further)
+    )
+    require_fit_to_follow(task.shore, task.site.frame, further)
+    treated = {name for sortie in assignment.sorties for name in sortie.hot_spots}
+    areas = tuple(spot.area for spot in task.site.hot_spots if spot.name in treated)
+    return TeamPlan(vehicles, _certified(task, vehicles, areas), assignment)
+
+
+def expected_calls(mission: Mission) -> int:
+    """How many times stages are called to plan a mission."""
+    vehicles = [vehicle.role for vehicle in mission.vehicles or ()]
+    counts = {role: max(vehicles.count(role), 1) for role in Role}
+    calls = 1
+    for role in mission.mission_type.roles:
+        treats = role is Role.SLAVE and mission.hot_features
+        calls += 2 if treats else 2 * counts[role] + (2 if counts[role] > 1 else 1)
+    return calls
+
+
+# --------------------------------------------------------------------------- one question to a stage each
+
+
+def _shared(task: Task, team: Sequence[Member]) -> Assignment:
+    """Who surveys does a master's work, and has a share, whatever its role."""
+    vehicles = tuple(msgspec.structs.replace(member.vehicle, role=Role.MASTER) for member in team)
+    request = AssignRequest(
+        free=task.space.free,
+        water=task.space.water,
+        vehicles=vehicles,
+        share_free=True,
+        seed=task.options.seed,
+    )
+    fields = {f"vehicle {each.vehicle.name!r}: length_m": each.fields["Master_length"] for each in team}
+    with renamed(fields):
+        return task.call(ASSIGN, request)
+
+
+def _shared_part(task: Task, member: Member, harbour: Harbour, share: Polygon) -> VehiclePlan:
+    with member.named():
+        approach = harbour.approach(share, member.vehicle)
+    return _covered(task, member, approach, share.area)
+
+
+def _covered(task: Task, member: Member, approach: Approach, water_m2: float) -> VehiclePlan:
+    """A path over all of a space, with the legs to it."""
+    with member.named():
+        length_m = approach.length_m(member.vehicle.length_m)
+        decomposition = _decomposed(task, member, approach.space, water_m2, length_m)
+        plan = _path(task, member, approach, decomposition, length_m)
+        path = approach.joined(plan.path)
+        return VehiclePlan(
+            member=member,
+            path=path,
+            heading_rad=decomposition.heading_rad,
+            spacing_m=plan.spacing_m,
+            area_m2=approach.space.free.area,
+            dropped=plan.dropped,
+            warnings=(
+                *approach.warnings(member.vehicle.length_m),
+                *plan.warnings,
+                *_unused(path, plan, member, length_m),
+            ),
+        )
+
+
+def _unused(path: LineString, plan: PathPlan, member: Member, length_m: float) -> tuple[str, ...]:
+    """What is to be known of a path that uses its length, while its legs leave much of what was kept for them."""
+    share = path.length / member.vehicle.length_m
+    if share >= WELL_USED or plan.path.length < WELL_USED * length_m:
+        return ()
+    return (f"uses {share:.1%} of its longest length: its legs are shorter than what was kept for them",)
+
+
+def _decomposed(task: Task, member: Member, space: FreeSpace, water_m2: float, length_m: float) -> Decomposition:
+    spacing_m = nominal_spacing_m(water_m2, length_m, task.mission.minimal_spatial_rate_m or 0.0)
+    request = DecomposeRequest(free=space.free, spacing_m=spacing_m, heading_rad=task.options.heading_rad)
+    return task.call(DECOMPOSE, request, part=task.part(member))
+
+
+def _path(
+    task: Task, member: Member, approach: Approach, decomposition: Decomposition, length_m: float
+) -> PathPlan:
+    options = task.options
+    with renamed({"min_spacing_m": "Minimal_spatial_rate"}):
+        request = PathRequest(
+            method=options.method,
+            space=approach.space,
+            decomposition=decomposition,
+            launch=approach.launch,
+            recovery=approach.recovery,
+            length_m=length_m,
+            spent_m=member.vehicle.length_m - length_m,
+            min_spacing_m=task.mission.minimal_spatial_rate_m or 0.0,
+            seed=options.seed,
+            weighted_areas=task.site.weighted_areas,
+            time_limit_s=options.time_limit_s,
+            smooth=options.smooth,
+            draw=options.draw,
+        )
+    return task.call(PATH, request, part=task.part(member))
+
+
+def _certified(task: Task, vehicles: Sequence[VehiclePlan], areas: tuple[Polygon, ...] = ()) -> Certificate:
+    """The certificate of a team's paths, none of which breaks a rule of the water."""
+    first, *others = (_track(plan) for plan in vehicles)
+    certificate = task.call(
+        CERTIFY,
+        CertifyRequest(
+            **msgspec.structs.asdict(first),
+            others=tuple(others),
+            outline=task.site.outline,
+            zones=task.site.zones,
+            safety_m=task.mission.safety_m,
+            least_width_m=task.mission.least_width_m,
+            variogram=task.mission.variogram,
+            areas=areas,
+            danger_zones=task.site.danger_zones,
+        ),
+        part=vehicles[0].member.vehicle.role if len(task.mission.mission_type.roles) > 1 else "",
+    )
+    require_faultless(certificate.faults, task.site.frame, vehicles)
+    require_fit_to_follow(task.shore, task.site.frame, vehicles)
+    return certificate
+
+
+def _track(plan: VehiclePlan) -> Track:
+    vehicle = plan.member.vehicle
+    return Track(path=plan.path, launch=vehicle.start, recovery=vehicle.recovery, speed_mps=vehicle.speed_mps)

@@ -1,0 +1,1 @@
+"""The mission in metres: its water, its weights, its fleet."""

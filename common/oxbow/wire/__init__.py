@@ -1,0 +1,1 @@
+"""Bytes on the bus: geometry, envelopes, layers, and what processes report about themselves."""

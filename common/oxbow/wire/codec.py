@@ -1,0 +1,96 @@
+"""How messages become bytes: MessagePack, with geometry as WKB and arrays as raw little-endian floats."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+from typing import Any, TypeVar
+
+import msgspec
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from oxbow.errors import InvalidMission
+from oxbow.wire.wkb import from_wkb
+
+__all__ = ["decode", "digest", "encode"]
+
+T = TypeVar("T")
+
+_FLOAT = "<f8"
+_MOST_DIMENSIONS = 3
+_AT = re.compile(r"(?P<problem>.*) - at `\$\.?(?P<path>.*)`", re.DOTALL)
+
+
+def _to_wire(value: Any) -> Any:
+    if isinstance(value, BaseGeometry):
+        return shapely.to_wkb(value)
+    if isinstance(value, np.ndarray):
+        return [_FLOAT, list(value.shape), np.ascontiguousarray(value, dtype=_FLOAT).tobytes()]
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"{type(value).__name__} cannot be sent")
+
+
+def _from_wire(kind: type, value: Any) -> Any:
+    """What msgspec does not know, or a ValueError, to which msgspec adds the field."""
+    origin = getattr(kind, "__origin__", kind)
+    if isinstance(origin, type) and issubclass(origin, BaseGeometry):
+        if not isinstance(value, bytes):
+            raise ValueError(f"is a {type(value).__name__}; expected WKB")
+        return from_wkb(value, origin)
+    if origin is np.ndarray:
+        return _array(value)
+    raise TypeError(f"{kind!r} cannot be received")
+
+
+def _array(value: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+    match value:
+        case [str(dtype), [*shape], bytes(data)] if dtype == _FLOAT and _is_shape(shape, len(data)):
+            array = np.frombuffer(data, dtype=_FLOAT).reshape(shape)
+        case _:
+            raise ValueError(
+                f"is no array; expected ['{_FLOAT}', shape, bytes] with so many bytes as the shape has"
+            )
+    if not np.isfinite(array).all():
+        raise ValueError("has elements that are not finite")
+    return array
+
+
+def _is_shape(shape: list[Any], size: int) -> bool:
+    if len(shape) > _MOST_DIMENSIONS or not all(type(length) is int and 0 <= length <= size for length in shape):
+        return False
+    return bool(8 * math.prod(shape) == size)
+
+
+_ENCODER = msgspec.msgpack.Encoder(enc_hook=_to_wire)
+
+
+def encode(message: msgspec.Struct) -> bytes:
+    """MessagePack bytes of a message."""
+    return _ENCODER.encode(message)
+
+
+def digest(message: msgspec.Struct) -> str:
+    """A digest of a message: equal where its bytes are."""
+    return hashlib.sha256(encode(message)).hexdigest()
+
+
+def decode(data: bytes, kind: type[T]) -> T:
+    """Decode `data` as a message of type `kind`.
+
+    Raises
+    ------
+    InvalidMission
+        The bytes are not such a message, or break one of its invariants; names the field.
+    """
+    try:
+        return msgspec.msgpack.decode(data, type=kind, dec_hook=_from_wire)
+    except msgspec.ValidationError as error:
+        match = _AT.fullmatch(str(error))
+        problem, path = (match["problem"], f".{match['path']}") if match else (str(error), "")
+        raise InvalidMission(f"{problem[:1].lower()}{problem[1:]}", where=f"{kind.__name__}{path}") from error
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, OverflowError) as error:
+        raise InvalidMission(f"is no MessagePack of one: {error}", where=kind.__name__) from error

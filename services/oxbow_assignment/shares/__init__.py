@@ -1,0 +1,1 @@
+"""Sharing the water among those who survey."""

@@ -1,0 +1,100 @@
+"""The mesh of an area: edges of one length, no triangle partly outside."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+from shapely import Polygon
+
+from oxbow.arrays import FloatArray
+from oxbow.errors import InvalidMission
+from oxbow.geometry.lattice import lattice_within
+from oxbow_assignment.shares.mesh.mesh import Mesh
+from oxbow_assignment.shares.mesh.refinement import refined
+from oxbow_assignment.shares.mesh.relaxation import relaxed
+from oxbow_assignment.shares.mesh.triangulation import Triangulation
+
+__all__ = ["mesh_area"]
+
+PITCH = 0.85
+"""Pitch of the lattice, as a share of the longest edge: few edges become longer than allowed."""
+
+FROM_BORDER = 0.65
+"""Points of the lattice nearer to the border than this share of its pitch are left out."""
+
+RELAXATIONS = 20
+
+GREATEST_BOUND_DEG = 30.0
+"""Greatest bound on the least angle that can be asked for."""
+
+MAX_TRIANGLES = 2_000_000
+
+
+def mesh_area(
+    area: Polygon, edge_m: float, *, least_angle_deg: float = 0.0, relaxations: int = RELAXATIONS
+) -> Mesh:
+    """Tile an area with triangles whose edges are about, and never more than, `edge_m` long.
+
+    Balampanis, Maza and Ollero 2016, section IV: the mesh is a constrained Delaunay triangulation, its longest
+    edge the footprint of the sensor. There CGAL refines it point by point. Here the border is divided evenly, an
+    equilateral lattice fills the inside, and Lloyd's relaxation (their section VIII) joins the two.
+
+    Parameters
+    ----------
+    area
+        A valid polygon, with or without holes; all its vertices become vertices of the mesh.
+    edge_m
+        The longest edge: the footprint of the sensor.
+    least_angle_deg
+        Triangles with a smaller angle are refined, but for such as the area's own angles and narrows enforce.
+    relaxations
+        Rounds of Lloyd's relaxation.
+
+    Raises
+    ------
+    InvalidMission
+        The area or the edge is not fit for a mesh.
+    """
+    _require_fit(area, edge_m, least_angle_deg)
+    origin = shapely.get_coordinates(area.envelope.centroid)[0]
+    local = shapely.transform(shapely.orient_polygons(area), lambda xy: xy - origin)
+    border = shapely.segmentize(local, PITCH * edge_m)
+    mesh = Triangulation.of(border).with_points(_lattice(local, border, PITCH * edge_m))
+    mesh = relaxed(refined(mesh, edge_m, 0.0), edge_m, relaxations)
+    mesh = refined(mesh, edge_m, math.radians(least_angle_deg))
+    return Mesh.of(Triangulation(mesh.points + origin, mesh.triangles))
+
+
+def _require_fit(area: Polygon, edge_m: float, least_angle_deg: float) -> None:
+    if area.is_empty or not area.is_valid or area.area == 0.0:
+        raise InvalidMission("is empty or not a valid polygon; expected one with an area", where="area")
+    if not 0.0 < edge_m < math.inf:
+        raise InvalidMission(f"is {edge_m!r}; expected a finite number > 0.0", where="edge_m")
+    if not 0.0 <= least_angle_deg <= GREATEST_BOUND_DEG:
+        raise InvalidMission(
+            f"is {least_angle_deg!r}; expected 0 to {GREATEST_BOUND_DEG:g} degrees", where="least_angle_deg"
+        )
+    expected = 4 / math.sqrt(3) * area.area / (PITCH * edge_m) ** 2
+    if expected > MAX_TRIANGLES:
+        raise InvalidMission(
+            f"is {edge_m!r}, which makes about {expected:.0f} triangles; expected one that makes at most"
+            f" {MAX_TRIANGLES}",
+            where="edge_m",
+        )
+
+
+def _lattice(area: Polygon, border: Polygon, pitch_m: float) -> FloatArray:
+    """Points of an equilateral lattice well inside an area, its rows along the area's longest edge."""
+    ring = shapely.get_coordinates(area.exterior)
+    steps = np.diff(ring, axis=0)
+    longest = int(np.argmax(np.hypot(*steps.T)))
+    turn = np.arctan2(steps[longest, 1], steps[longest, 0])
+    along = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    upright = shapely.transform(area, lambda xy: (xy - ring[longest]) @ along.T)
+    row_m = pitch_m * math.sqrt(0.75)
+    places = lattice_within(upright, (0.0, 0.0), pitch_m, row_m, shift_m=pitch_m / 2)
+    places = places @ along + ring[longest]
+    far = shapely.distance(shapely.points(places), border.boundary) > FROM_BORDER * pitch_m
+    return np.asarray(places[far])

@@ -1,0 +1,161 @@
+"""A triangulation that is changed step by step: points put in, sides flipped, always tiling the same area."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from shapely import Polygon
+
+from oxbow.arrays import FloatArray, Indices, Mask
+from oxbow.geometry.triangles import (
+    apexes,
+    cross,
+    doubled_areas,
+    flipped,
+    following,
+    side_lengths,
+    triangulated,
+    twins_of,
+)
+from oxbow.tolerances import ROUNDING
+
+__all__ = ["Triangulation"]
+
+FLIP_TOLERANCE = 1e-10
+"""Sides whose opposite angles sum to less than pi and this are left: flipping them would gain nothing."""
+
+MAX_FLIPS = 200
+"""Rounds of flips: rounding could let a few sides flip to and fro for ever."""
+
+
+@dataclass(frozen=True)
+class Triangulation:
+    """Triangles that tile an area; every change gives a new one that tiles the same area."""
+
+    points: FloatArray
+    triangles: Indices
+
+    @classmethod
+    def of(cls, area: Polygon) -> Triangulation:
+        """The constrained Delaunay triangulation of a polygon's own vertices."""
+        return cls(*triangulated(area)).legalised()
+
+    @cached_property
+    def twins(self) -> Indices:
+        """See `twins_of`."""
+        return twins_of(self.triangles)
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """Coordinates of the corners, shape (m, 3, 2)."""
+        return self.points[self.triangles]
+
+    @cached_property
+    def doubled_areas(self) -> FloatArray:
+        """Twice the area of every triangle, in m2; negative where it is turned over."""
+        return doubled_areas(self.corners)
+
+    @cached_property
+    def side_lengths(self) -> FloatArray:
+        """Length of every side, shape (m, 3)."""
+        return side_lengths(self.corners)
+
+    @cached_property
+    def least_sines(self) -> FloatArray:
+        """The sine of every triangle's least angle, opposite its shortest side; below 0 if turned over."""
+        middle, longest = np.sort(self.side_lengths, axis=1)[:, 1:].T
+        return np.asarray(self.doubled_areas / (middle * longest))
+
+    @cached_property
+    def border_points(self) -> Mask:
+        """Which points lie on the border of the area, shape (n,)."""
+        on_border = np.zeros(len(self.points), dtype=bool)
+        on_border[self.triangles.ravel()[self.twins < 0]] = True
+        return on_border
+
+    def legalised(self) -> Triangulation:
+        """The constrained Delaunay triangulation of the same points, by Lawson's flips (1977).
+
+        All sides that no other flip touches are flipped at once, round after round.
+        """
+        triangles, twins = self.triangles, self.twins
+        for _ in range(MAX_FLIPS):
+            side = _flippable(self.points, triangles, twins)
+            if len(side) == 0:
+                break
+            triangles = flipped(triangles, side, twins[side])
+            twins = twins_of(triangles)
+        return Triangulation(self.points, triangles)
+
+    def located(self, places: FloatArray) -> Indices:
+        """The number of a triangle that holds each place, shape (n,); -1 outside the area."""
+        tree = shapely.STRtree(np.asarray(shapely.polygons(self.corners)))
+        place, triangle = tree.query(shapely.points(places), predicate="intersects")
+        holder = np.full(len(places), -1, dtype=np.intp)
+        holder[place[::-1]] = triangle[::-1]
+        return holder
+
+    def with_points(self, places: FloatArray) -> Triangulation:
+        """The constrained Delaunay triangulation with more points, all strictly inside the area.
+
+        In each round every triangle takes the point nearest to its middle, and is divided in three.
+        """
+        mesh = self
+        while len(places):
+            holder = mesh.located(places)
+            places, holder = places[holder >= 0], holder[holder >= 0]
+            if len(places) == 0:
+                break
+            from_middle = np.hypot(*(places - mesh.corners[holder].mean(axis=1)).T)
+            order = np.lexsort([from_middle, holder])
+            chosen = order[np.unique(holder[order], return_index=True)[1]]
+            mesh = mesh._divided(holder[chosen], places[chosen]).legalised()
+            places = np.delete(places, chosen, axis=0)
+        return mesh
+
+    def _divided(self, which: Indices, places: FloatArray) -> Triangulation:
+        """Each of some triangles divided in three, at a place inside it."""
+        new = len(self.points) + np.arange(len(places))
+        a, b, c = self.triangles[which].T
+        triangles = self.triangles.copy()
+        triangles[which] = np.column_stack([a, b, new])
+        more = np.vstack([np.column_stack([b, c, new]), np.column_stack([c, a, new])])
+        return Triangulation(np.vstack([self.points, places]), np.vstack([triangles, more]))
+
+    def with_border_points(self, sides: Indices) -> Triangulation:
+        """The constrained Delaunay triangulation with some border sides halved, one of a triangle at most."""
+        tails, heads = self.triangles.ravel()[sides], self.triangles.ravel()[following(sides)]
+        apex = apexes(self.triangles, sides)
+        new = len(self.points) + np.arange(len(sides))
+        points = np.vstack([self.points, (self.points[tails] + self.points[heads]) / 2])
+        triangles = self.triangles.copy()
+        triangles[sides // 3] = np.column_stack([tails, new, apex])
+        return Triangulation(points, np.vstack([triangles, np.column_stack([new, heads, apex])])).legalised()
+
+
+def _flippable(points: FloatArray, triangles: Indices, twins: Indices) -> Indices:
+    """Numbers of sides that break the Delaunay criterion and can be flipped, no two of one triangle."""
+    side = np.flatnonzero(twins > np.arange(len(twins)))
+    tail, head = points[triangles.ravel()[side]], points[triangles.ravel()[following(side)]]
+    apex, beyond = points[apexes(triangles, side)], points[apexes(triangles, twins[side])]
+    excess = _angle(tail - apex, head - apex) + _angle(head - beyond, tail - beyond) - np.pi
+    least_new = np.minimum(cross(tail - apex, beyond - apex), cross(beyond - apex, head - apex))
+    wrong = (excess > FLIP_TOLERANCE) & (least_new > -ROUNDING * np.ptp(points, axis=0).max() ** 2)
+    side = side[wrong]
+    # Worst first; of the sides of one triangle, the worst alone.
+    order = np.argsort(-excess[wrong], kind="stable")
+    side = side[order]
+    rank = np.full(len(triangles), len(side), dtype=np.intp)
+    numbers = np.arange(len(side))
+    one, other = side // 3, twins[side] // 3
+    np.minimum.at(rank, one, numbers)
+    np.minimum.at(rank, other, numbers)
+    return np.asarray(side[(rank[one] == numbers) & (rank[other] == numbers)])
+
+
+def _angle(a: FloatArray, b: FloatArray) -> FloatArray:
+    """The angle between planar vectors, 0 to pi, shape (n,)."""
+    return np.asarray(np.arctan2(np.abs(cross(a, b)), (a * b).sum(axis=1)))

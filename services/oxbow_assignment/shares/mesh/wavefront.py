@@ -1,0 +1,67 @@
+"""Wavefronts over a mesh: who reaches a triangle first, and in how many steps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from oxbow.arrays import Indices, Mask
+from oxbow_assignment.shares.mesh.mesh import Mesh
+
+__all__ = ["Wavefront", "propagate"]
+
+UNREACHED = -1
+
+
+@dataclass(frozen=True)
+class Wavefront:
+    """What the wavefronts left on every triangle.
+
+    Parameters
+    ----------
+    source : ndarray of int, shape (m,)
+        Which start reached the triangle first, as an index into the starts; -1 where none did.
+    depth : ndarray of int, shape (m,)
+        Steps from that start, 0 on the start itself; -1 where none reached.
+    branch : ndarray of int, shape (m,)
+        Through which side of the start's triangle the wave came, ``3 * source + side``; -1 on starts.
+    """
+
+    source: Indices
+    depth: Indices
+    branch: Indices
+
+
+def propagate(mesh: Mesh, starts: Sequence[int] | Indices, within: Mask | None = None) -> Wavefront:
+    """Let antagonising wavefronts run from some triangles (Balampanis, Maza and Ollero 2016, Algorithm 1).
+
+    In every step each wave takes the free neighbours of what it took in the step before; where two waves reach a
+    triangle in one step, the one from the triangle of lower index has it. Depths begin at 0; in the paper at 1.
+
+    Parameters
+    ----------
+    mesh
+        The mesh.
+    starts
+        Triangles; of starts on one triangle, the first has it.
+    within
+        The triangles that waves may enter, shape (m,); all where absent.
+    """
+    free = np.ones(len(mesh), dtype=bool) if within is None else within.copy()
+    source, depth, branch = (np.full(len(mesh), UNREACHED, dtype=np.intp) for _ in range(3))
+    front, first = np.unique(np.asarray(starts, dtype=np.intp), return_index=True)
+    source[front], depth[front], free[front] = first, 0, False
+    step = 0
+    while len(front):
+        step += 1
+        reached = mesh.neighbours[front].ravel()
+        by = np.repeat(front, 3)
+        opens = np.flatnonzero((reached >= 0) & free[reached])
+        following, at = np.unique(reached[opens], return_index=True)
+        parent = by[opens[at]]
+        source[following], depth[following], free[following] = source[parent], step, False
+        branch[following] = branch[parent] if step > 1 else 3 * source[parent] + opens[at] % 3
+        front = following
+    return Wavefront(source, depth, branch)

@@ -1,0 +1,307 @@
+"""Sharing an area: every vehicle gets a connected part of the water, as large as its capacity asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.sparse.csgraph import dijkstra
+from shapely import Polygon
+
+from oxbow.arrays import FloatArray, Indices, Mask, Place
+from oxbow.errors import InvalidMission
+from oxbow_assignment.shares.balancing import balanced_shares, border_lengths_m, imbalance
+from oxbow_assignment.shares.mesh import Mesh, propagate
+
+__all__ = [
+    "BALANCE",
+    "Partition",
+    "balanced_partition",
+    "due_areas_m2",
+    "largest_piece",
+    "rebalanced",
+    "wavefront_partition",
+]
+
+BALANCE = 0.05
+"""How far the area of a share may be from what is due to it, as a share of that."""
+
+ROUNDS = 6
+"""How often seeds move to the middle of their shares."""
+
+SUBDIVISIONS = 4
+
+
+@dataclass(frozen=True)
+class Partition:
+    """A mesh shared among vehicles.
+
+    Parameters
+    ----------
+    mesh
+        The mesh, divided further than the given one where balance asked for it.
+    share : ndarray of int, shape (m,)
+        The vehicle of every triangle.
+    depth : ndarray of int, shape (m,)
+        Steps of the vehicle's wavefront from its seed to the triangle, within its share.
+    seeds
+        The triangle that each wavefront started from.
+    capacities : ndarray, shape (k,)
+        What every vehicle can cover, in any unit.
+    """
+
+    mesh: Mesh
+    share: Indices
+    depth: Indices
+    seeds: tuple[int, ...]
+    capacities: FloatArray
+
+    @classmethod
+    def of(cls, mesh: Mesh, share: Indices, capacities: FloatArray) -> Partition:
+        """A partition whose waves start from the middles of its shares."""
+        seeds = _middles(mesh, share, len(capacities))
+        return cls(mesh, share, _depth(mesh, share, seeds), tuple(seeds.tolist()), capacities)
+
+    @cached_property
+    def areas_m2(self) -> FloatArray:
+        """Area of every share, shape (k,)."""
+        return np.bincount(self.share, self.mesh.areas_m2, minlength=len(self.seeds)).astype(float)
+
+    @cached_property
+    def due_m2(self) -> FloatArray:
+        """The area due to every vehicle, in proportion to its capacity, shape (k,)."""
+        return due_areas_m2(self.mesh, self.share, self.capacities)
+
+    @property
+    def imbalance(self) -> float:
+        """The greatest deviation of a share's area from what is due, as a share of that."""
+        return imbalance(self.areas_m2, self.due_m2)
+
+    @cached_property
+    def regions(self) -> tuple[Polygon, ...]:
+        """Every share as a polygon, maybe with holes."""
+        return tuple(self.mesh.region(self.share == vehicle) for vehicle in range(len(self.seeds)))
+
+    @cached_property
+    def borders_m(self) -> FloatArray:
+        """Length of the border between every two shares, shape (k, k)."""
+        return border_lengths_m(self.mesh, self.share, len(self.seeds))
+
+    @property
+    def border_m(self) -> float:
+        """Length of all borders between shares: the less, the more compact are the shares."""
+        return float(self.borders_m.sum() / 2)
+
+
+def wavefront_partition(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None = None) -> Partition:
+    """Share a mesh by antagonising wavefronts (Balampanis, Maza and Ollero 2016, Algorithm 1).
+
+    Waves of one speed run from the vehicles' starts; what capacities ask for is not looked at. Where vehicles
+    start from one triangle, all but the first are sent elsewhere before, as far from the others as possible.
+
+    Raises
+    ------
+    InvalidMission
+        There are no vehicles or more than triangles, or a capacity is not positive.
+    """
+    capacities = _checked(mesh, starts, capacities)
+    seeds = _spread(mesh, starts, capacities, _everywhere(mesh, starts))
+    waves = propagate(mesh, seeds)
+    return Partition(mesh, waves.source, waves.depth, tuple(seeds.tolist()), capacities)
+
+
+def balanced_partition(
+    mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None = None, allowed: Mask | None = None
+) -> Partition:
+    """Share a mesh in proportion to capacities, every share connected: within `BALANCE`, or as nearly as can be.
+
+    The wavefronts' shares are balanced (`oxbow_assignment.shares.balancing`), their seeds move to their middles,
+    and so on; of all rounds, the shares with the shortest borders are taken. Where triangles are too large for
+    balance, or dead ends only one triangle wide, the mesh is divided further.
+
+    Parameters
+    ----------
+    mesh
+        The mesh of the area.
+    starts
+        Where each vehicle starts from, in planar metres; equal starts are spread.
+    capacities
+        What each vehicle can cover; all equal where absent.
+    allowed : ndarray of bool, shape (k, m)
+        Which triangles each vehicle may have, at least one each; all where absent. A triangle that none of its
+        neighbours' vehicles may have stays where it is all the same.
+
+    Raises
+    ------
+    InvalidMission
+        There are no vehicles or more than triangles, or a capacity is not positive.
+    """
+    capacities = _checked(mesh, starts, capacities)
+    allowed = _everywhere(mesh, starts) if allowed is None else allowed
+    seeds = _spread(mesh, starts, capacities, allowed)
+    share = min(_rounds(mesh, seeds, capacities, allowed), key=partial(_badness, mesh, capacities=capacities))
+    for _ in range(SUBDIVISIONS if allowed.all() else 0):
+        if _imbalance(mesh, share, capacities) <= BALANCE:
+            break
+        mesh, share, allowed = mesh.subdivided(), np.repeat(share, 4), np.repeat(allowed, 4, axis=1)
+        share = _balanced(mesh, share, capacities, allowed)
+    return Partition.of(mesh, share, capacities)
+
+
+def rebalanced(partition: Partition, capacities: FloatArray, allowed: Mask) -> Partition:
+    """A partition with its borders moved as other capacities ask for; see `balanced_partition`."""
+    share = _balanced(partition.mesh, partition.share, capacities, allowed)
+    return Partition.of(partition.mesh, share, capacities)
+
+
+def _checked(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None) -> FloatArray:
+    capacities = np.ones(len(starts)) if capacities is None else np.asarray(capacities, dtype=float)
+    if not 0 < len(starts) <= len(mesh):
+        raise InvalidMission(f"are {len(starts)}; expected 1 to {len(mesh)}, one for a triangle", where="Vehicles")
+    if len(capacities) != len(starts):
+        raise InvalidMission(f"are {len(starts)}, with {len(capacities)} capacities", where="Vehicles")
+    for vehicle, capacity in enumerate(capacities.tolist()):
+        if not 0.0 < capacity < np.inf:
+            raise InvalidMission(f"has a capacity of {capacity!r}; expected > 0", where=f"Vehicles[{vehicle}]")
+    return capacities
+
+
+def _everywhere(mesh: Mesh, starts: Sequence[Place]) -> Mask:
+    return np.ones((len(starts), len(mesh)), dtype=bool)
+
+
+def due_areas_m2(mesh: Mesh, share: Indices, capacities: FloatArray) -> FloatArray:
+    """The area due to every share in proportion to capacities, shape (k,).
+
+    Pieces of the mesh that do not hang together are each shared by those who are there.
+    """
+    piece = mesh.pieces[np.unique(share, return_index=True)[1]]
+    areas_m2 = np.bincount(mesh.pieces, mesh.areas_m2)
+    return np.asarray(areas_m2[piece] * capacities / np.bincount(piece, capacities)[piece])
+
+
+def _rounds(mesh: Mesh, seeds: Indices, capacities: FloatArray, allowed: Mask) -> Iterator[Indices]:
+    """Balanced shares from the given seeds, and from seeds that move to their middles."""
+    for _ in range(ROUNDS):
+        share = _matched(mesh, propagate(mesh, seeds).source, allowed)
+        share = _balanced(mesh, share, capacities, allowed)
+        yield share
+        middles, before = _middles(mesh, share, len(capacities)), seeds
+        seeds = np.where(allowed[np.arange(len(seeds)), middles], middles, seeds)
+        if (seeds == before).all():
+            break
+
+
+def _matched(mesh: Mesh, share: Indices, allowed: Mask) -> Indices:
+    """The same shares, each with the vehicle that suits it: such that the least of them is out of reach."""
+    if allowed.all():
+        return share
+    barred_m2 = (~allowed * mesh.areas_m2) @ (share[:, None] == np.arange(len(allowed)))
+    vehicles, shares = linear_sum_assignment(barred_m2)
+    return np.asarray(vehicles[np.argsort(shares)][share])
+
+
+def _balanced(mesh: Mesh, share: Indices, capacities: FloatArray, allowed: Mask) -> Indices:
+    """Shares of allowed triangles, as far as that can be, balanced."""
+    share = _within_reach(mesh, share, allowed)
+    share = balanced_shares(mesh, share, due_areas_m2(mesh, share, capacities), allowed)
+    return _within_reach(mesh, share, allowed)
+
+
+def _with_all(share: Indices, allowed: Mask) -> Indices:
+    """Shares of which none is empty: who has nothing within reach gets a triangle of the largest share there."""
+    share = share.copy()
+    for vehicle in np.flatnonzero(~(allowed & (share == np.arange(len(allowed))[:, None])).any(axis=1)):
+        sizes = np.bincount(share, minlength=len(allowed))
+        within = np.flatnonzero(allowed[vehicle])
+        share[within[np.argmax(sizes[share[within]])]] = vehicle
+    return share
+
+
+def _within_reach(mesh: Mesh, share: Indices, allowed: Mask) -> Indices:
+    """Shares without what is not allowed, and what that cuts off; neighbours have it, where they may.
+
+    Every share keeps its largest connected part of allowed triangles, one at least.
+    """
+    if allowed.all():
+        return share
+    share = _with_all(share, allowed)
+    kept = np.zeros(len(mesh), dtype=bool)
+    for vehicle, own in enumerate(allowed):
+        kept |= largest_piece(mesh, own & (share == vehicle))
+    while (~kept).any():
+        triangle, side = np.nonzero((mesh.neighbours >= 0) & ~kept[:, None])
+        beside = mesh.neighbours[triangle, side]
+        takes = kept[beside] & allowed[share[beside], triangle]
+        taken, first = np.unique(triangle[takes], return_index=True)
+        if not len(taken):
+            break
+        share = share.copy()
+        share[taken], kept[taken] = share[beside[takes][first]], True
+    return share
+
+
+def largest_piece(mesh: Mesh, which: Mask) -> Mask:
+    """Of some triangles, those of the connected piece with the greatest area."""
+    pieces = mesh.part(which).pieces
+    largest = np.zeros(len(mesh), dtype=bool)
+    largest[which] = pieces == np.argmax(np.bincount(pieces, mesh.areas_m2[which], minlength=1))
+    return largest
+
+
+def _imbalance(mesh: Mesh, share: Indices, capacities: FloatArray) -> float:
+    areas_m2 = np.bincount(share, mesh.areas_m2, minlength=len(capacities)).astype(float)
+    return imbalance(areas_m2, due_areas_m2(mesh, share, capacities))
+
+
+def _badness(mesh: Mesh, share: Indices, *, capacities: FloatArray) -> tuple[float, float]:
+    """Balance first, where it is not good enough; then the length of all borders."""
+    borders_m = border_lengths_m(mesh, share, len(capacities))
+    return max(_imbalance(mesh, share, capacities), BALANCE), float(borders_m.sum())
+
+
+def _depth(mesh: Mesh, share: Indices, seeds: Indices) -> Indices:
+    """Steps from the seed of every triangle's share, within the share."""
+    depth = np.zeros(len(mesh), dtype=np.intp)
+    for vehicle, seed in enumerate(seeds.tolist()):
+        own = share == vehicle
+        depth[own] = propagate(mesh, [seed], own).depth[own]
+    return depth
+
+
+def _spread(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray, allowed: Mask) -> Indices:
+    """A triangle for each vehicle: that of its start, or else the one farthest by water from those taken.
+
+    Of vehicles that start together, those of least reach and capacity are served first, so that the others have
+    what is far away.
+    """
+    wanted = mesh.located(np.asarray(starts, dtype=float))
+    order = np.lexsort([capacities, allowed @ mesh.areas_m2])
+    seeds = np.full(len(wanted), -1)
+    first = order[np.unique(wanted[order], return_index=True)[1]]
+    first = first[allowed[first, wanted[first]]]
+    seeds[first] = wanted[first]
+    for vehicle in order[seeds[order] < 0]:
+        distance = _distance_from(mesh, seeds[seeds >= 0])
+        seeds[vehicle] = int(np.argmax(np.where(allowed[vehicle], distance, -1.0)))
+    return seeds
+
+
+def _distance_from(mesh: Mesh, triangles: Indices) -> FloatArray:
+    """Metres by water from the nearest of some triangles, shape (m,); the same everywhere where there are none."""
+    if not len(triangles):
+        return np.zeros(len(mesh))
+    return np.asarray(dijkstra(mesh.graph, indices=triangles, min_only=True))
+
+
+def _middles(mesh: Mesh, share: Indices, count: int) -> Indices:
+    """The triangle of every share that is nearest to its centroid."""
+    middles = []
+    for vehicle in range(count):
+        own = np.flatnonzero(share == vehicle)
+        centroid = np.average(mesh.centroids[own], axis=0, weights=mesh.areas_m2[own])
+        middles.append(own[np.argmin(np.hypot(*(mesh.centroids[own] - centroid).T))])
+    return np.asarray(middles)

@@ -1,0 +1,180 @@
+"""Share targets out among vehicles: cluster, match, order; then mend.
+
+Clusters of targets go to vehicles, and each vehicle puts its own in order (Innocenti, Pollini and Bracci 2006,
+section 4.4). The report has no ranges and no idea of balance; what that leaves to do is done by insertions and
+exchanges.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from oxbow.arrays import Indices
+from oxbow.errors import InvalidMission
+from oxbow_assignment.targets.assignment import Assignment, assignment_of
+from oxbow_assignment.targets.clustering import Clusters, cluster_by_radius, fuzzy_c_means, k_means
+from oxbow_assignment.targets.exchange import exchanged
+from oxbow_assignment.targets.insertion import inserted, traded, trimmed
+from oxbow_assignment.targets.matching import match
+from oxbow_assignment.targets.ordering import EXACT_MOST, best_path, exact_path
+from oxbow_assignment.targets.problem import COST, Problem
+from oxbow_assignment.targets.pseudo_coordinates import PseudoCoordinates, pseudo_coordinates
+
+__all__ = ["ClusterMethod", "Clustered", "Clustering", "assign", "cluster_paths", "mended"]
+
+STARTS = 3
+"""Starts of k-means: three leave two thirds of one's gap to the joint optimiser, five hardly less than three."""
+
+
+class ClusterMethod(enum.StrEnum):
+    """How targets are clustered."""
+
+    K_MEANS = "k-means"
+    FUZZY_C_MEANS = "fuzzy c-means"
+    RADIUS = "radius"
+
+
+@dataclass(frozen=True)
+class Clustering:
+    """How targets are clustered.
+
+    Parameters
+    ----------
+    method
+        k-means or fuzzy c-means with `k` clusters, or as many as `radius_m` asks for.
+    k
+        The number of clusters; by default as many as vehicles that can visit a target. At most the number of
+        targets are made.
+    radius_m
+        The longest mean route from a target to its cluster's targets, for `ClusterMethod.RADIUS` and only for it.
+    seed, starts
+        Where k-means starts, and how often it starts anew: the best assignment counts.
+
+    Raises
+    ------
+    InvalidMission
+        A number or a radius that is missing, out of place or not positive.
+    """
+
+    method: ClusterMethod = ClusterMethod.K_MEANS
+    k: int | None = None
+    radius_m: float | None = None
+    seed: int = 0
+    starts: int = STARTS
+
+    def __post_init__(self) -> None:
+        by_radius = self.method is ClusterMethod.RADIUS
+        if by_radius != (self.radius_m is not None):
+            raise InvalidMission(
+                f"is {self.radius_m!r}; expected a number >= 0 for method {ClusterMethod.RADIUS.value!r} and none"
+                f" for another; the method is {self.method.value!r}",
+                where="radius_m",
+            )
+        if self.k is not None and (by_radius or self.k < 1):
+            raise InvalidMission(f"is {self.k}; expected 1 or more, and none with a radius", where="k")
+        if self.starts < 1:
+            raise InvalidMission(f"is {self.starts}; expected 1 or more", where="starts")
+
+
+@dataclass(frozen=True)
+class Clustered:
+    """An assignment, and the clusters that it was made from.
+
+    Parameters
+    ----------
+    targets : ndarray of shape (m,)
+        The targets that were clustered: those that some vehicle can visit.
+    clusters
+        Their clusters.
+    owners : ndarray of shape (k,)
+        The index of the vehicle that each cluster was matched to.
+    stress
+        How ill the clusters' space pictures the routes; see `PseudoCoordinates`.
+    """
+
+    assignment: Assignment
+    targets: Indices
+    clusters: Clusters | None
+    owners: Indices
+    stress: float
+
+
+def assign(problem: Problem, clustering: Clustering | None = None) -> Clustered:
+    """Who visits which targets in which order, by clusters.
+
+    Every tour is within its vehicle's range, and every target is in a tour or among the unserved.
+    """
+    clustering = clustering or Clustering()
+    targets = np.flatnonzero(problem.can_visit.any(axis=0))
+    if not len(targets):
+        idle = [problem.path(vehicle, ()) for vehicle in range(len(problem.vehicles))]
+        return Clustered(assignment_of(problem, idle), targets, None, np.empty(0, dtype=np.intp), 0.0)
+    coordinates = pseudo_coordinates(problem.mean_costs[np.ix_(targets, targets)])
+    found = (
+        _by_clusters(problem, targets, coordinates, clusters)
+        for clusters in _clusterings(problem, coordinates, clustering)
+    )
+    return min(found, key=lambda clustered: clustered.assignment.rank)
+
+
+def _by_clusters(
+    problem: Problem, targets: Indices, coordinates: PseudoCoordinates, clusters: Clusters
+) -> Clustered:
+    owners = match(problem, clusters, targets)
+    paths = cluster_paths(problem, targets, clusters, owners)
+    assignment = assignment_of(problem, mended(problem, paths, [0] * len(paths)))
+    return Clustered(assignment, targets, clusters, owners, coordinates.stress)
+
+
+def cluster_paths(problem: Problem, targets: Indices, clusters: Clusters, owners: Indices) -> list[Indices]:
+    """Each vehicle's path through its own clusters, as far as its range allows: all that the report does."""
+    own = owners[clusters.labels]
+    return [
+        trimmed(
+            problem,
+            vehicle,
+            best_path(problem.figures[COST, vehicle], problem.path(vehicle, targets[own == vehicle])),
+        )
+        for vehicle in range(len(problem.vehicles))
+    ]
+
+
+def mended(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
+    """Paths after insertions, exchanges and trades, in turns until nothing more is gained.
+
+    Parameters
+    ----------
+    paths
+        One a vehicle, each within its range: rows of the problem's distances, start first and recovery last.
+    held
+        How many leading targets of each path stay in front.
+    """
+    while True:
+        paths = exchanged(problem, inserted(problem, paths, held), held)
+        traded_paths = traded(problem, paths, held)
+        if all(path is before for path, before in zip(traded_paths, paths, strict=True)):
+            return [_exact(problem, vehicle, path, held[vehicle]) for vehicle, path in enumerate(paths)]
+        paths = traded_paths
+
+
+def _exact(problem: Problem, vehicle: int, path: Indices, held: int) -> Indices:
+    """A path in the best order behind its held targets, if it has few enough to find it, within its range."""
+    if len(path) - held > EXACT_MOST + 2:
+        return path
+    best = np.concatenate([path[:held], exact_path(problem.figures[COST, vehicle], path[held:])])
+    return best if problem.is_within_range(vehicle, best) else path
+
+
+def _clusterings(problem: Problem, coordinates: PseudoCoordinates, clustering: Clustering) -> Iterator[Clusters]:
+    if clustering.radius_m is not None:
+        yield cluster_by_radius(coordinates, clustering.radius_m)
+        return
+    able = int(problem.can_visit.any(axis=1).sum())
+    k = min(clustering.k or able, len(coordinates.places))
+    cluster = fuzzy_c_means if clustering.method is ClusterMethod.FUZZY_C_MEANS else k_means
+    for start in range(clustering.starts):
+        yield cluster(coordinates, k, seed=clustering.seed + start)

@@ -1,0 +1,137 @@
+"""Fit tours into ranges: targets that are too much are taken out, and put in where there is range left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from oxbow.arrays import FloatArray, Indices
+from oxbow_assignment.targets.assignment import tour_figures, tour_length
+from oxbow_assignment.targets.problem import COST, LENGTH, ROUNDING, Problem
+
+__all__ = ["inserted", "traded", "trimmed"]
+
+VALUE_ROUNDING = 1e-9
+"""Differences of value below this are rounding."""
+
+FAR_M = 1e12
+"""A detour that does not fit counts as so long, where a finite figure is needed."""
+
+LEAST_SAVED_S = 1e-6
+"""Savings below this are rounding."""
+
+
+def trimmed(
+    problem: Problem, vehicle: int, path: Indices, *, held: int = 0, wanted: np.intp | None = None
+) -> Indices:
+    """A path within its vehicle's range, of targets that it may visit.
+
+    While it is too long, the target goes that saves most metres for its value; a `wanted` target goes after all
+    others but the first `held`, which go last.
+    """
+    inner = path[1:-1]
+    path = np.concatenate([path[:1], inner[problem.can_visit[vehicle, inner]], path[-1:]])
+    metres = problem.figures[LENGTH, vehicle]
+    while tour_length(problem, vehicle, path) > problem.lengths_m[vehicle]:
+        before, at, after = path[:-2], path[1:-1], path[2:]
+        saved = metres[before, at] + metres[at, after] - metres[before, after]
+        worth = saved / problem.values[at]
+        worth[at == wanted] = np.finfo(float).min
+        worth[:held] = -np.inf
+        path = np.delete(path, 1 + int(worth.argmax()))
+    return path
+
+
+def inserted(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
+    """The paths with every target put in that fits: always the one that costs least for its value.
+
+    Parameters
+    ----------
+    paths
+        One a vehicle, within its range.
+    held
+        How many leading targets of each path stay in front.
+    """
+    paths = list(paths)
+    served = np.concatenate([path[1:-1] for path in paths])
+    pool = np.setdiff1d(np.flatnonzero(problem.can_visit.any(axis=0)), served)
+    offers = [_offers(problem, vehicle, path, held[vehicle], pool) for vehicle, path in enumerate(paths)]
+    while len(pool):
+        costs = np.array([offer.costs for offer in offers])
+        vehicle, chosen = divmod(int(costs.argmin()), len(pool))
+        if not np.isfinite(costs[vehicle, chosen]):
+            break
+        paths[vehicle] = np.insert(paths[vehicle], offers[vehicle].places[chosen], pool[chosen])
+        pool = np.delete(pool, chosen)
+        offers = [offer.without(chosen) for offer in offers]
+        offers[vehicle] = _offers(problem, vehicle, paths[vehicle], held[vehicle], pool)
+    return paths
+
+
+def traded(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
+    """The paths with targets that nobody visits put in the place of others, where that is worth it.
+
+    A target is put in although it does not fit, and others are trimmed: that stays if the path then serves more
+    value, or as much in less time. The first `held` targets of each path stay.
+    """
+    paths = list(paths)
+    served = np.concatenate([path[1:-1] for path in paths])
+    pool = np.setdiff1d(np.flatnonzero(problem.can_visit.any(axis=0)), served)
+    for target in pool[np.argsort(-problem.values[pool], kind="stable")]:
+        trades = [
+            _trade(problem, vehicle, paths[vehicle], held[vehicle], target)
+            for vehicle in np.flatnonzero(problem.can_visit[:, target]).tolist()
+        ]
+        best = min(trades, key=lambda trade: (-trade.value, trade.added_s))
+        if best.value > VALUE_ROUNDING or (best.value > -VALUE_ROUNDING and best.added_s < -LEAST_SAVED_S):
+            paths[best.vehicle] = best.path
+    return paths
+
+
+@dataclass(frozen=True)
+class _Trade:
+    """A path with a target put in and others taken out: the value and the seconds that this adds."""
+
+    vehicle: int
+    path: Indices
+    value: float
+    added_s: float
+
+
+def _trade(problem: Problem, vehicle: int, path: Indices, held: int, target: np.intp) -> _Trade:
+    before, after = path[held:-1], path[held + 1 :]
+    costs = problem.figures[COST, vehicle]
+    detours = costs[before, target] + costs[target, after] - costs[before, after]
+    longer = np.insert(path, held + 1 + int(detours.argmin()), target)
+    traded = trimmed(problem, vehicle, longer, held=held, wanted=target)
+    added_m = float((tour_figures(problem, vehicle, traded) - tour_figures(problem, vehicle, path))[COST])
+    value = problem.values[traded[1:-1]].sum() - problem.values[path[1:-1]].sum()
+    return _Trade(vehicle, traded, float(value), added_m / problem.vehicles[vehicle].speed_mps)
+
+
+@dataclass(frozen=True)
+class _Offers:
+    """For each target of a pool, where one path takes it best, and at what cost; infinite where it cannot."""
+
+    costs: FloatArray
+    places: Indices
+
+    def without(self, chosen: int) -> _Offers:
+        return _Offers(np.delete(self.costs, chosen), np.delete(self.places, chosen))
+
+
+def _offers(problem: Problem, vehicle: int, path: Indices, held: int, pool: Indices) -> _Offers:
+    before, after, own = path[held:-1], path[held + 1 :], problem.figures[:, vehicle]
+    now = tour_figures(problem, vehicle, path)
+    kept = own[:, before, after] if len(path) > 2 else np.zeros((2, 1))
+    added = own[:, pool[:, None], before] + own[:, pool[:, None], after] - kept[:, None]
+    limit_m = problem.lengths_m[vehicle] * (1.0 - ROUNDING if len(path) > 2 else 1.0)
+    fits = problem.has_role[vehicle, pool, None] & (now[LENGTH] + added[LENGTH] <= limit_m)
+    detours = np.where(fits, added[COST], np.inf)
+    places = detours.argmin(axis=1)
+    longer = now[COST] + np.minimum(detours.min(axis=1), FAR_M)
+    strain = problem.strain(np.append(longer, now[COST]), np.full(len(pool) + 1, vehicle))
+    costs = np.where(fits.any(axis=1), (strain[:-1] - strain[-1]) / problem.values[pool], np.inf)
+    return _Offers(costs=costs, places=held + 1 + places)

@@ -1,0 +1,126 @@
+"""The joint optimiser: targets, vehicles and orders at once, and how far clusters stay behind it.
+
+Beyond the report, which clusters because the joint problem is NP-hard (Innocenti, Pollini and Bracci 2006,
+section 4.1). Needs the optional extra ``fleet`` (PyVRP).
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import dataclass
+
+from oxbow.errors import Unavailable
+from oxbow_assignment.targets.assign import Clustered, Clustering, assign
+from oxbow_assignment.targets.assignment import Assignment, assignment_of
+from oxbow_assignment.targets.problem import Objective, Problem
+
+__all__ = ["PATIENCE", "Gap", "Solution", "gap_to", "is_available", "optimise", "solve"]
+
+PATIENCE = 2_000
+"""Iterations without improvement after which a search ends: a few seconds for 60 targets."""
+
+PRECISION = 0.005
+"""How near to the shortest makespan that was reached the longest lies that was not."""
+
+MISSING = "the optional extra `fleet` (PyVRP) is not installed: pip install 'oxbow[fleet]'"
+NOT_ASKED = "the joint optimiser was not asked for"
+
+
+@dataclass(frozen=True)
+class Gap:
+    """How much more an assignment costs than the joint optimiser's.
+
+    Parameters
+    ----------
+    relative
+        The excess as a share of the joint optimiser's cost: 0.05 is 5 % more, below 0 is better than it. None
+        where there is no such figure.
+    reason
+        Why there is none; empty where there is one.
+    """
+
+    relative: float | None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The clustered assignment, the joint one if there is one, and how far the clusters stay behind it."""
+
+    clustered: Clustered
+    joint: Assignment | None
+    gap: Gap
+
+    @property
+    def best(self) -> Assignment:
+        """Whichever serves more value, or the same at less cost."""
+        if self.joint is None:
+            return self.clustered.assignment
+        return min(self.clustered.assignment, self.joint, key=lambda found: found.rank)
+
+    @property
+    def best_gap(self) -> Gap:
+        """The gap between the best and the joint one: 0 where that is the best, below 0 where it is not."""
+        return self.gap if self.joint is None else gap_to(self.best, self.joint)
+
+
+def solve(
+    problem: Problem, clustering: Clustering | None = None, *, patience: int | None = PATIENCE, seed: int = 0
+) -> Solution:
+    """Assign by clusters, and compare that with the joint optimiser.
+
+    Parameters
+    ----------
+    problem, clustering
+        See `assign`.
+    patience, seed
+        See `optimise`; no joint optimiser where `patience` is None.
+    """
+    clustered = assign(problem, clustering)
+    if patience is None or not is_available():
+        return Solution(clustered, None, Gap(None, NOT_ASKED if patience is None else MISSING))
+    joint = optimise(problem, patience=patience, seed=seed)
+    return Solution(clustered, joint, gap_to(clustered.assignment, joint))
+
+
+def is_available() -> bool:
+    """Whether the optional extra is installed."""
+    return importlib.util.find_spec("pyvrp") is not None
+
+
+def optimise(problem: Problem, *, patience: int = PATIENCE, seed: int = 0) -> Assignment:
+    """The best assignment that PyVRP's iterated local search finds; ranges are capacities.
+
+    A search ends by iterations, not by time: the same problem and seed give the same assignment. PyVRP knows no
+    makespan; for it, the longest duration allowed is bisected between what was reached and what was not.
+
+    Raises
+    ------
+    Unavailable
+        PyVRP is not installed.
+    """
+    if not is_available():
+        raise Unavailable(MISSING, where="joint")
+    from oxbow_assignment.targets.pyvrp_solver import solved  # noqa: PLC0415 (an optional dependency)
+
+    best = assignment_of(problem, solved(problem, patience=patience, seed=seed))
+    if problem.objective is Objective.TOTAL:
+        return best
+    missed_s = 0.0
+    while best.cost_s - missed_s > PRECISION * best.cost_s:
+        within_s = (best.cost_s + missed_s) / 2
+        found = assignment_of(problem, solved(problem, patience=patience, seed=seed, within_s=within_s))
+        if found.value == best.value and found.cost_s < best.cost_s:
+            best = found
+        else:
+            missed_s = within_s
+    return best
+
+
+def gap_to(assignment: Assignment, joint: Assignment) -> Gap:
+    """The gap between two assignments of one problem, if they serve the same value."""
+    if assignment.value != joint.value:
+        return Gap(None, f"clusters serve targets worth {assignment.value:g}, the joint optimiser {joint.value:g}")
+    if assignment.cost_s == joint.cost_s:
+        return Gap(0.0)
+    return Gap(assignment.cost_s / joint.cost_s - 1.0)

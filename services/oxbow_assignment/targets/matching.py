@@ -1,0 +1,52 @@
+"""Clusters to vehicles: the Hungarian method (H. W. Kuhn, 1955), through SciPy."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from oxbow.arrays import FloatArray, Indices
+from oxbow_assignment.targets.clustering import Clusters
+from oxbow_assignment.targets.problem import COST, Problem
+
+__all__ = ["match"]
+
+OUT_OF_REACH = 1e3
+"""How many times as much as the costliest target a target counts that a vehicle cannot visit."""
+
+
+def match(problem: Problem, clusters: Clusters, targets: Indices) -> Indices:
+    """The vehicle of each cluster, of least sum of mean costs (Innocenti, Pollini and Bracci 2006, 4.2 and 4.4).
+
+    A cluster costs a vehicle the mean duration of its routes to the cluster's targets. With more clusters than
+    vehicles the report adds fictitious vehicles; here the clusters that those would get are matched in further
+    rounds, each vehicle then coming from the cluster that it got last. With more vehicles than clusters some
+    get none.
+
+    Parameters
+    ----------
+    problem
+        Its vehicles and distances.
+    clusters, targets
+        The clusters, and which targets of the problem were clustered, shape (n,).
+
+    Returns
+    -------
+    ndarray of shape (k,)
+        The index of each cluster's vehicle.
+    """
+    shares = np.eye(clusters.count)[clusters.labels]
+    shares /= shares.sum(axis=0)
+    costs = problem.figures[COST]
+    from_start = costs[np.arange(len(costs))[:, None], problem.starts[:, None], targets] @ shares
+    between = shares.T @ costs[:, targets[:, None], targets] @ shares
+    barred = ~problem.can_visit[:, targets] @ shares * OUT_OF_REACH * costs.max()
+    owners = np.full(clusters.count, -1)
+    lengths: FloatArray = from_start
+    while (left := np.flatnonzero(owners < 0)).size:
+        durations = (lengths + barred) / problem.speeds_mps[:, None]
+        vehicles, columns = linear_sum_assignment(durations[:, left])
+        owners[left[columns]] = vehicles
+        lengths = lengths.copy()
+        lengths[vehicles] = between[vehicles, left[columns]]
+    return owners

@@ -1,0 +1,220 @@
+"""What is to be shared out: targets, vehicles, and the metres between them.
+
+Routes have two figures: what they cost, danger included, and how long they are. Costs are what an assignment makes
+small; lengths are what must be within a range.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from oxbow.arrays import FloatArray, Indices, Mask
+from oxbow.contracts import Role, Vehicle
+from oxbow.errors import InvalidMission
+
+__all__ = ["COST", "LENGTH", "ROUNDING", "Objective", "Problem", "require_distances"]
+
+COST, LENGTH = 0, 1
+"""The two figures of a route, first index of arrays that have both."""
+
+
+ROUNDING = 1e-12
+"""Lengths that are the same sum in another order differ by less than this share."""
+
+SYMMETRY = 1e-6
+"""Least relative difference between there and back that is not rounding."""
+
+MAKESPAN_POWER = 8
+"""The sum of this power of durations stands for the longest."""
+
+
+class Objective(enum.StrEnum):
+    """What an assignment makes small, once as much value as possible is served.
+
+    `TOTAL` is the sum of all vehicles' durations: the team cost J of Innocenti, Pollini and Bracci 2006,
+    section 4.2. It may leave vehicles at home. `MAKESPAN` is the longest duration: when the last vehicle is
+    done. Durations are those of costs: a metre that danger is worth counts as one that is travelled.
+    """
+
+    TOTAL = "total"
+    MAKESPAN = "makespan"
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Targets to be visited by vehicles.
+
+    Parameters
+    ----------
+    vehicles
+        At least one; names are different.
+    distances : ndarray of shape (n + 2 v, n + 2 v), or (v, n + 2 v, n + 2 v)
+        Metres along the routes between the n targets, then the v vehicles' starts, then their recoveries: what
+        `RouteTable` gives for these points in this order, for all vehicles or for each. Symmetric; infinite where
+        there is no route.
+    objective
+        What to make small.
+    values : ndarray of shape (n,)
+        What it is worth to visit each target; > 0, by default 1. Where not all can be visited, value comes first.
+    roles
+        For each target the role that a vehicle needs to visit it, or None for any; by default None for all.
+    costs : ndarray of shape (n + 2 v, n + 2 v), or (v, n + 2 v, n + 2 v)
+        What the same routes cost, in metres; by default their lengths.
+
+    Raises
+    ------
+    InvalidMission
+        A field that breaks these rules.
+    """
+
+    vehicles: tuple[Vehicle, ...]
+    distances: FloatArray
+    objective: Objective = Objective.TOTAL
+    values: FloatArray = field(default_factory=lambda: np.empty(0))
+    roles: tuple[Role | None, ...] = ()
+    costs: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        require_vehicles(self.vehicles)
+        for own in self.distances.reshape(-1, *self.distances.shape[-2:]):
+            require_distances(own)
+        if self.distances.shape[-1] < 2 * len(self.vehicles):
+            raise InvalidMission(
+                f"has {self.distances.shape[-1]} rows; expected at least {2 * len(self.vehicles)}:"
+                f" a start and a recovery for each of {len(self.vehicles)} vehicles",
+                where="distances",
+            )
+        if not len(self.values):
+            object.__setattr__(self, "values", np.ones(self.count))
+        if self.values.shape != (self.count,) or not (np.isfinite(self.values) & (self.values > 0)).all():
+            raise InvalidMission(f"expected {self.count} finite numbers > 0, one a target", where="values")
+        if len(self.roles) not in (0, self.count):
+            raise InvalidMission(f"has {len(self.roles)}; expected {self.count}, one a target", where="roles")
+
+    @property
+    def count(self) -> int:
+        """How many targets there are."""
+        return int(self.distances.shape[-1]) - 2 * len(self.vehicles)
+
+    def path(self, vehicle: int, targets: Sequence[int] | Indices) -> Indices:
+        """The rows that a vehicle passes: its start, its targets and its recovery."""
+        return np.array([self.starts[vehicle], *targets, self.recoveries[vehicle]])
+
+    @property
+    def targets(self) -> slice:
+        """The targets' rows."""
+        return slice(0, self.count)
+
+    @property
+    def starts(self) -> Indices:
+        """Each vehicle's row."""
+        return self.count + np.arange(len(self.vehicles))
+
+    @property
+    def recoveries(self) -> Indices:
+        """The row of each vehicle's recovery."""
+        return self.count + len(self.vehicles) + np.arange(len(self.vehicles))
+
+    @cached_property
+    def lengths_m(self) -> FloatArray:
+        """Each vehicle's range, shape (v,)."""
+        return np.array([vehicle.length_m for vehicle in self.vehicles])
+
+    @cached_property
+    def speeds_mps(self) -> FloatArray:
+        """Each vehicle's speed, shape (v,)."""
+        return np.array([vehicle.speed_mps for vehicle in self.vehicles])
+
+    def strain(self, costs_m: FloatArray, vehicles: Indices) -> FloatArray:
+        """What tours of these costs add to the objective, each for the vehicle beside it.
+
+        The longest duration alone does not tell good moves between other tours: for `MAKESPAN` the strain is a
+        high power of the duration, whose sum the longest ones rule.
+        """
+        durations: FloatArray = costs_m / self.speeds_mps[vehicles]
+        return durations**MAKESPAN_POWER if self.objective is Objective.MAKESPAN else durations
+
+    @cached_property
+    def lengths(self) -> FloatArray:
+        """Lengths of routes for each vehicle, infinite where there is none, shape (v, n + 2 v, n + 2 v)."""
+        rows = self.distances.shape[-1]
+        return np.broadcast_to(self.distances, (len(self.vehicles), rows, rows))
+
+    @cached_property
+    def figures(self) -> FloatArray:
+        """Costs and lengths of routes for each vehicle, shape (2, v, n + 2 v, n + 2 v).
+
+        Where there is no route, both are beyond every range.
+        """
+        costs = self.distances if self.costs is None else self.costs
+        both = np.stack([np.broadcast_to(costs, self.lengths.shape), self.lengths])
+        far_m = 2.0 * max(float(both[np.isfinite(both)].max()), float(self.lengths_m.max()))
+        return np.where(np.isfinite(both), both, far_m)
+
+    @cached_property
+    def mean_costs(self) -> FloatArray:
+        """What routes cost the vehicles on average, shape (n + 2 v, n + 2 v)."""
+        return np.asarray(self.figures[COST].mean(axis=0))
+
+    @cached_property
+    def there_and_back_m(self) -> FloatArray:
+        """The length of the route of each vehicle that visits one target alone, shape (v, n)."""
+        each = np.arange(len(self.vehicles))
+        ends = self.lengths[each, self.starts] + self.lengths[each, self.recoveries]
+        return np.asarray(ends[:, self.targets])
+
+    def is_within_range(self, vehicle: int, path: Indices) -> bool:
+        """Whether a vehicle's path with targets is within its range."""
+        length_m = float(self.figures[LENGTH, vehicle, path[:-1], path[1:]].sum())
+        return len(path) <= 2 or length_m <= self.lengths_m[vehicle]
+
+    @cached_property
+    def has_role(self) -> Mask:
+        """Which vehicle has the role that each target asks for, shape (v, n)."""
+        roles = self.roles or (None,) * self.count
+        allowed = [[role in (None, vehicle.role) for role in roles] for vehicle in self.vehicles]
+        return np.array(allowed, dtype=bool).reshape(len(self.vehicles), self.count)
+
+    @cached_property
+    def can_visit(self) -> Mask:
+        """Which vehicle has the role and the range for each target, shape (v, n)."""
+        return self.has_role & (self.there_and_back_m <= self.lengths_m[:, None])
+
+
+def require_vehicles(vehicles: Sequence[Vehicle]) -> None:
+    """Check that there are vehicles, and that their names tell them apart."""
+    if not vehicles:
+        raise InvalidMission("is empty; expected at least one vehicle", where="vehicles")
+    names = [vehicle.name for vehicle in vehicles]
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidMission(
+                f"{names.count(name)} vehicles are named {name!r}; expected one", where="vehicles"
+            )
+
+
+def require_distances(distances: FloatArray) -> None:
+    """Check a matrix of distances: square, symmetric, no NaN, none negative, zero from a point to itself."""
+    if distances.ndim != 2 or distances.shape[0] != distances.shape[1]:
+        raise InvalidMission(f"has shape {distances.shape}; expected a square matrix", where="distances")
+    bad = ~(distances >= 0.0)
+    bad[np.diag_indices(len(distances))] |= np.diag(distances) != 0.0
+    there, back = (
+        np.where(np.isinf(distances), -1.0, distances),
+        np.where(np.isinf(distances.T), -1.0, distances.T),
+    )
+    for wrong, expected in (
+        (bad, "a number >= 0, and 0 from a point to itself"),
+        (np.abs(there - back) > SYMMETRY * (1.0 + there), "the same there and back"),
+    ):
+        if wrong.any():
+            i, j = np.argwhere(wrong)[0].tolist()
+            raise InvalidMission(
+                f"is {distances[i, j]:g} m and back {distances[j, i]:g} m; expected {expected}",
+                where=f"distances[{i}, {j}]",
+            )

@@ -1,0 +1,129 @@
+"""Reassign what is left, when a vehicle is lost or a target is new, without sending vehicles to and fro.
+
+The Hungarian method alone may turn a vehicle round before it has visited anything (Innocenti, Pollini and
+Bracci 2006, section 4.2). Here a vehicle keeps its current target, the first of its tour, unless giving it up
+is worth more than a hysteresis.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from oxbow.arrays import Indices
+from oxbow.errors import InvalidMission
+from oxbow_assignment.targets.assign import mended
+from oxbow_assignment.targets.assignment import Assignment, assignment_of
+from oxbow_assignment.targets.insertion import trimmed
+from oxbow_assignment.targets.problem import Problem
+
+__all__ = ["Reassignment", "reassign"]
+
+
+@dataclass(frozen=True)
+class Reassignment:
+    """An assignment of what is left.
+
+    Parameters
+    ----------
+    assignment
+        The new tours.
+    kept
+        The assignment in which everybody keeps the current target, where that is still within reach.
+    changed
+        Names of the vehicles that give up a current target that they could have kept.
+    """
+
+    assignment: Assignment
+    kept: Assignment
+    changed: tuple[str, ...]
+
+
+def reassign(problem: Problem, tours: Sequence[Sequence[int]], *, hysteresis_s: float) -> Reassignment:
+    """Who visits what is left, in which order.
+
+    A lost vehicle is one that `problem` does not have any more, a new target one that is in no tour. First all
+    keep their current targets, and the rest is shared out anew. Then vehicles are let go, all at once or one
+    after another: that stays if it serves more value, or lowers the objective by more than `hysteresis_s` for
+    each current target that changes.
+
+    Parameters
+    ----------
+    problem
+        What is left: vehicles where they are now, with the range that they have left, and targets not yet visited.
+    tours
+        For each vehicle of the problem the targets it was to visit, in order, as targets of this problem.
+    hysteresis_s
+        What the change of one current target must gain, in seconds of the objective; >= 0.
+
+    Raises
+    ------
+    InvalidMission
+        Tours that do not fit the problem, or a hysteresis that is negative or not a number.
+    """
+    if not hysteresis_s >= 0.0:
+        raise InvalidMission(f"is {hysteresis_s!r} s; expected a number >= 0", where="hysteresis_s")
+    _require_tours(problem, tours)
+    paths = [trimmed(problem, vehicle, problem.path(vehicle, tour), held=1) for vehicle, tour in enumerate(tours)]
+    current = tuple(
+        tour[0] if len(tour) and _first(path) == tour[0] else None for path, tour in zip(paths, tours, strict=True)
+    )
+    bound = frozenset(vehicle for vehicle, target in enumerate(current) if target is not None)
+    kept = best = _Candidate.of(problem, paths, bound, current)
+    while best.bound:
+        freed = [frozenset(), *(best.bound - {vehicle} for vehicle in sorted(best.bound))]
+        found = min(
+            (_Candidate.of(problem, best.paths, bound, current) for bound in freed),
+            key=lambda candidate: candidate.rank(hysteresis_s),
+        )
+        if found.rank(hysteresis_s) >= best.rank(hysteresis_s):
+            break
+        best = found
+    names = tuple(problem.vehicles[vehicle].name for vehicle in best.changed)
+    return Reassignment(assignment=best.assignment, kept=kept.assignment, changed=names)
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """Paths on which the vehicles in `bound` keep their current target."""
+
+    paths: Sequence[Indices]
+    bound: frozenset[int]
+    assignment: Assignment
+    changed: tuple[int, ...]
+
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        paths: Sequence[Indices],
+        bound: frozenset[int],
+        current: Sequence[int | None],
+    ) -> _Candidate:
+        paths = mended(problem, paths, [int(vehicle in bound) for vehicle in range(len(paths))])
+        changed = tuple(
+            vehicle
+            for vehicle, (path, target) in enumerate(zip(paths, current, strict=True))
+            if target is not None and _first(path) != target
+        )
+        return cls(paths, bound, assignment_of(problem, paths), changed)
+
+    def rank(self, hysteresis_s: float) -> tuple[float, float]:
+        """Value first; then the objective, and the hysteresis for each change. Less is better."""
+        return -self.assignment.value, self.assignment.cost_s + hysteresis_s * len(self.changed)
+
+
+def _first(path: Indices) -> int | None:
+    """The first target of a path."""
+    return int(path[1]) if len(path) > 2 else None
+
+
+def _require_tours(problem: Problem, tours: Sequence[Sequence[int]]) -> None:
+    if len(tours) != len(problem.vehicles):
+        raise InvalidMission(f"has {len(tours)}; expected {len(problem.vehicles)}, one a vehicle", where="tours")
+    for target, times in Counter(target for tour in tours for target in tour).items():
+        if not 0 <= target < problem.count:
+            raise InvalidMission(f"has target {target}; expected 0 to {problem.count - 1}", where="tours")
+        if times > 1:
+            raise InvalidMission(f"visits target {target} {times} times; expected once", where="tours")

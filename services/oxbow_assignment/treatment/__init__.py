@@ -1,0 +1,1 @@
+"""Treating hot spots: passes, parts, sorties."""

@@ -1,0 +1,210 @@
+"""The slaves at sea: where each enters and leaves the free space, and how far treatments lie from there.
+
+Where there are danger zones, routes are those of least cost: what danger on the way is worth counts as so many
+metres (M. Innocenti, L. Pollini and A. Bracci 2006, section 3), as many times as the vehicle is less fit for what
+it is sent to. A range is what is travelled: lengths of the same routes, danger or not. A route that starts in a
+zone counts it, and so does the route that led there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import shapely
+from msgspec import structs
+from shapely import LineString, Polygon
+
+from oxbow.arrays import FloatArray, Indices
+from oxbow.contracts import Vehicle
+from oxbow.errors import Infeasible, InvalidMission
+from oxbow.geometry.route import NO_DANGER, Danger, RouteMethod, Router, RouteTable, leg_routes, way_to
+from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.route.methods import router_on
+from oxbow_assignment.targets.problem import LENGTH
+
+__all__ = ["Fleet", "Ways"]
+
+MARGIN = 1e-9
+"""Share of each range that is kept back for rounding."""
+
+
+@dataclass(frozen=True)
+class Ways:
+    """The best routes of v slaves from and to the ends of n lines; figures are cost and length, in metres.
+
+    Parameters
+    ----------
+    starts, recoveries : ndarray of shape (2, v, n, 2)
+        From each slave's start, and to its recovery, over its leg ashore if it has one, to both ends of each line.
+    between : ndarray of shape (2, v, n, n, 2, 2)
+        From one line's ends to another's, for each slave.
+    lengths_m : ndarray of shape (n,)
+        The lines' own lengths.
+    tables
+        The routes for each danger factor.
+    factors : ndarray of shape (v, p, p)
+        Which of them each slave takes between places: 2 n ends of lines, v docks to set out from, v to come home.
+    rows : ndarray of int, shape (p,)
+        Each place's number in the tables.
+    """
+
+    starts: FloatArray
+    recoveries: FloatArray
+    between: FloatArray
+    lengths_m: FloatArray
+    tables: Mapping[float, RouteTable]
+    factors: FloatArray
+    rows: Indices
+
+    @cached_property
+    def access_m(self) -> FloatArray:
+        """How far each slave travels to each line and home, either way round on average, shape (v, n)."""
+        return np.asarray(self.starts[LENGTH].mean(axis=2) + self.recoveries[LENGTH].mean(axis=2))
+
+    def route(self, slave: int, start: int, goal: int) -> LineString:
+        """The route of a slave from one place to another."""
+        table = self.tables[float(self.factors[slave, start, goal])]
+        return LineString(table.polyline(int(self.rows[start]), int(self.rows[goal])))
+
+    def out(self, slave: int, end: int) -> LineString:
+        """The route of a slave from where it enters the free space to an end of a line."""
+        return self.route(slave, 2 * len(self.lengths_m) + slave, end)
+
+    def home(self, slave: int, end: int) -> LineString:
+        """The route of a slave from an end of a line to where it leaves the free space."""
+        return self.route(slave, end, 2 * len(self.lengths_m) + len(self.factors) + slave)
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """Slaves, and where they enter and leave the free space.
+
+    Parameters
+    ----------
+    slaves
+        At least one.
+    free
+        Where they may go; prepared.
+    water
+        What their legs may cross.
+    danger
+        What is to be avoided there, for a vehicle of factor 1.
+    out, home
+        A leg for each slave: from its start to the free space, and from there to its recovery (`way_to`); of no
+        length where the point lies in the free space.
+    """
+
+    slaves: tuple[Vehicle, ...]
+    free: Polygon
+    water: Polygon
+    danger: Danger
+    out: tuple[LineString, ...]
+    home: tuple[LineString, ...]
+
+    @classmethod
+    def of(cls, slaves: Sequence[Vehicle], free: Polygon, water: Polygon, danger: Danger = NO_DANGER) -> Fleet:
+        """The slaves, their legs and their routers.
+
+        Raises
+        ------
+        InvalidMission
+            There is no slave.
+        Infeasible
+            A slave's range does not suffice to reach the free space and go home.
+        """
+        if not slaves:
+            raise InvalidMission("has no slave; expected one or more to treat the hot spots", where="vehicles")
+        shore = leg_routes(free, water)
+        out = tuple(LineString(way_to(free, shore, slave.start)) for slave in slaves)
+        home = tuple(LineString(way_to(free, shore, slave.recovery)[::-1]) for slave in slaves)
+        for slave, leg, back in zip(slaves, out, home, strict=True):
+            if leg.length + back.length >= slave.length_m:
+                raise Infeasible(
+                    f"lies {leg.length:.0f} m outside the free space, and the recovery {back.length:.0f} m;"
+                    f" expected less than the vehicle's {slave.length_m:.0f} m in all",
+                    where=f"vehicle {slave.name!r}: start",
+                )
+        return cls(tuple(slaves), free, water, danger, out, home)
+
+    @cached_property
+    def cautious_slaves(self) -> tuple[Vehicle, ...]:
+        """The slaves, with a little less range."""
+        return tuple(structs.replace(slave, length_m=slave.length_m * (1.0 - MARGIN)) for slave in self.slaves)
+
+    @cached_property
+    def lengths_m(self) -> FloatArray:
+        """What a single part may ask of each slave, shape (v,): again a little less."""
+        return np.array([slave.length_m * (1.0 - MARGIN) for slave in self.cautious_slaves])
+
+    @cached_property
+    def _legs_m(self) -> FloatArray:
+        """Length of each leg out, then of each leg home, shape (2 v,)."""
+        return shapely.length(np.array([*self.out, *self.home]))
+
+    def ways(self, lines: Sequence[LineString], spots: Sequence[str] = ()) -> Ways:
+        """The best routes between the ends of some lines, and from and to the slaves.
+
+        Parameters
+        ----------
+        lines
+            What is treated.
+        spots
+            The hot spot of each line, for slaves that are more or less fit for it; none of them where empty.
+        """
+        ends = np.array([line.coords[end] for line in lines for end in (0, -1)])
+        docks = np.array([leg.coords[-1] for leg in self.out] + [leg.coords[0] for leg in self.home])
+        places, rows = np.unique(np.vstack([ends, docks]), axis=0, return_inverse=True)
+        factors = self._factors(spots or [""] * len(lines))
+        tables = {factor: self._router(factor).table(places) for factor in np.unique(factors).tolist()}
+        figures = np.empty((2, *factors.shape))
+        for factor, table in tables.items():
+            for own, known in zip(figures, (table.costs, table.lengths_m), strict=True):
+                known_there = np.broadcast_to(known[np.ix_(rows, rows)], factors.shape)
+                own[factors == factor] = known_there[factors == factor]
+        count, boats = len(lines), len(self.slaves)
+        each = np.arange(boats)
+        docked = [figures[:, each, 2 * count + k * boats + each, : 2 * count] for k in (0, 1)]
+        from_docks = np.stack(docked, axis=1)
+        from_docks = (from_docks + self._legs_m.reshape(2, boats, 1)).reshape(2, 2, boats, count, 2)
+        between = figures[:, :, : 2 * count, : 2 * count].reshape(2, boats, count, 2, count, 2)
+        return Ways(
+            starts=from_docks[:, 0],
+            recoveries=from_docks[:, 1],
+            between=between.transpose(0, 1, 2, 4, 3, 5),
+            lengths_m=shapely.length(np.asarray(lines)),
+            tables=tables,
+            factors=factors,
+            rows=rows,
+        )
+
+    def _factors(self, spots: Sequence[str]) -> FloatArray:
+        """By how much danger counts more for each slave between places, shape (v, p, p): see `Ways.factors`.
+
+        A route counts as its ends do: between two hot spots, as that for which the slave is less fit.
+        """
+        count = 2 * len(spots) + 2 * len(self.slaves)
+        if not self.danger.outlines:
+            return np.ones((len(self.slaves), count, count))
+        own = np.ones((len(self.slaves), count))
+        for row, slave in zip(own, self.slaves, strict=True):
+            known = [slave.danger_factors.get(spot, slave.danger_factor) for spot in spots]
+            row[: 2 * len(spots)] = np.repeat(known, 2)
+        return np.maximum(own[:, :, None], own[:, None, :])
+
+    @cached_property
+    def _mesh(self) -> Mesh:
+        return Mesh.of(self.free, self.danger.outlines)
+
+    @cached_property
+    def _routers(self) -> dict[float, Router]:
+        """The routers that were asked for, by danger factor."""
+        return {}
+
+    def _router(self, factor: float) -> Router:
+        if factor not in self._routers:
+            danger = replace(self.danger, a=factor)
+            self._routers[factor] = router_on(self._mesh, RouteMethod.VISIBILITY, danger)
+        return self._routers[factor]

@@ -1,0 +1,32 @@
+"""The walk round transects at one spacing (Rendas and Li 2016, section 1.2.1.1)."""
+
+from __future__ import annotations
+
+from oxbow_path.walk.circuit import plan_circuit
+from oxbow_path.walk.transects import place_transects
+from oxbow_path.walk.trial import Pattern, Trial, Waters, walked
+
+__all__ = ["try_transects"]
+
+LEAST_TRANSECT = 2.0
+"""In spacings. Where the water is narrower, out and back along its middle is shorter than transects across."""
+
+
+def try_transects(waters: Waters, pattern: Pattern) -> Trial:
+    """Build the path for one pattern.
+
+    The tree is made of transects two spacings apart, so that the legs on their two sides stand one spacing apart.
+    """
+    transects = place_transects(
+        waters.cells,
+        2 * pattern.spacing_m,
+        phase=pattern.phase,
+        min_length_m=LEAST_TRANSECT * pattern.spacing_m,
+    )
+    circuit = plan_circuit(
+        waters.cells,
+        transects,
+        trim_m=pattern.trim_m,
+        inset_m=pattern.half_width_m + pattern.trim_m,
+    )
+    return walked(waters, pattern, circuit)
