@@ -90,7 +90,7 @@ Oxbow's processes meet on [Zenoh](https://zenoh.io) 1.x, each in `client` mode a
   what is new there after each publication, each loss of the link, and now and then, as `oxbow.Client` does.
 - A query that has no reply at all was lost: ask again. Requests may be repeated under one `request_id`.
 - A stage with several replicas has a key for each. The caller chooses one that is alive, the one with the fewest
-  of its requests, and asks another where the first is busy or lost. `oxbow.bus.Bus.call` does all of this.
+  of its requests, and asks another where the first is busy or lost. `oxbow.bus.client.Bus.call` does all of this.
 - Chunks that begin with `@` are matched by no wildcard: `oxbow/v1/stage/*/*` asks stages to work, and
   `{any_introspection_key("ping")}` asks them, the mission service and the recorder how they are.
 """

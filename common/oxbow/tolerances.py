@@ -5,6 +5,7 @@ from __future__ import annotations
 __all__ = [
     "DEFAULT_LEAST_WIDTH_M",
     "DEFAULT_SHORE_TOLERANCE_M",
+    "DISTANCE_ROUNDING",
     "FARTHEST_M",
     "HAIR_M",
     "ON_SHORE_M",
@@ -21,6 +22,9 @@ intersect moves places by far less."""
 
 ROUNDING = 2.0**-48
 """How exact coordinates are, as a share of the greatest one: a few units in the last place."""
+
+DISTANCE_ROUNDING = 1e-9
+"""Distances and offsets that are computed in two ways agree to this share."""
 
 ON_SHORE_M = 5e-3
 """A place ashore that is no farther than this from the water is on its shore: degrees of seven decimals are a

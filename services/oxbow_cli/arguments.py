@@ -5,7 +5,6 @@ from __future__ import annotations
 import enum
 import math
 import os
-import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import TypeVar
 
 import msgspec
 
-from oxbow.bus import DEFAULT_ENDPOINT
+from oxbow.bus.config import require_endpoint
 from oxbow.contracts import MOST_DEADLINE_S, Draw, Method
 from oxbow.errors import InvalidMission, OxbowError, renamed
 from oxbow.geometry.frame import Position
@@ -38,13 +37,10 @@ __all__ = [
 LEAST_S = 0.001
 """Of a time limit: an alarm can be set for no less."""
 
-_ENDPOINT = re.compile(r"[a-z][a-z0-9_-]*/\S+")
-
 
 def endpoint(text: str, where: str) -> str:
     """Where a router listens, as ``tcp/HOST:PORT``."""
-    if not _ENDPOINT.fullmatch(text):
-        raise InvalidMission(f"is {text!r}; expected PROTOCOL/ADDRESS, as {DEFAULT_ENDPOINT}", where=where)
+    require_endpoint(text, where)
     return text
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import msgspec
@@ -12,7 +11,7 @@ import numpy as np
 from shapely import LineString
 
 from oxbow.contracts import Certificate, CertifyRequest, Conformance, Measures, Role, Track
-from oxbow.errors import InvalidMission, OxbowError
+from oxbow.errors import InvalidMission, renamed
 from oxbow.geometry.frame import Frame, Position, geodesic_length_m, lonlat
 from oxbow.mission.file import Mission
 from oxbow.mission.plan import PlanCertificate
@@ -20,9 +19,10 @@ from oxbow.site.fleet import Member
 from oxbow.site.site import Site
 from oxbow_certificate.certify import certify
 
-__all__ = ["Evaluation", "VehicleEvaluation", "certify_request", "evaluate", "named_as_given"]
+__all__ = ["GIVEN_AS", "Evaluation", "VehicleEvaluation", "certify_request", "evaluate"]
 
-_FIELDS = {"safety_m": "Safety", "zones": "ForbiddenZones"}
+GIVEN_AS = {"safety_m": "Safety", "zones": "ForbiddenZones"}
+"""What the certificate's fields are called in the Mission File."""
 
 
 class VehicleEvaluation(Conformance, frozen=True, kw_only=True):
@@ -77,7 +77,7 @@ def evaluate(mission: Mission) -> Evaluation:
     site = Site.of(mission)
     paths = list(_paths(mission, site))
     teams = [[path for path in paths if path.role is role] for role in dict.fromkeys(path.role for path in paths)]
-    with named_as_given():
+    with renamed(GIVEN_AS):
         certificates = [certify(_request(mission, site, team)) for team in teams]
     vehicles = [
         _vehicle(path, conformance)
@@ -98,15 +98,6 @@ def evaluate(mission: Mission) -> Evaluation:
         ends_at_recovery_m=max(vehicle.ends_at_recovery_m for vehicle in first),
         vehicles=tuple(vehicles),
     )
-
-
-@contextmanager
-def named_as_given() -> Iterator[None]:
-    """Name in errors of the certificate's algorithms the fields that the Mission File has."""
-    try:
-        yield
-    except OxbowError as error:
-        raise type(error)(error.message, _FIELDS.get(error.where, error.where)) from error
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TypeVar
 
+from oxbow.bus.router import free_endpoint
 from oxbow.client import Client
 from oxbow.contracts import Call, Endpoint, Message, MissionStatus
 from oxbow.errors import DeadlineExceeded
@@ -24,7 +25,7 @@ from oxbow_cli.exits import DEBUG
 from oxbow_cli.interrupts import ending
 from oxbow_cli.local import local_call
 from oxbow_cli.scratch import scratch_folder
-from oxbow_cli.stack import StackSettings, free_endpoint, running_stack
+from oxbow_cli.stack import StackSettings, running_stack
 
 __all__ = ["Job", "Planned", "Progress", "plan_embedded", "plan_here", "plan_on"]
 

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import logging
 import os
-import socket
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from oxbow.bus import Bus
+from oxbow.bus.client import Bus
 from oxbow.contracts import STAGES
 from oxbow.errors import InvalidMission, Unavailable
 from oxbow_cli.health import PERIOD_S, Health
 from oxbow_cli.interrupts import ending
 from oxbow_cli.supervisor import Child, Supervisor
 
-__all__ = ["SERVICES", "StackSettings", "free_endpoint", "running_stack"]
+__all__ = ["SERVICES", "StackSettings", "running_stack"]
 
 START_S = 30.0
 """How long a stack may take to come up, on a machine that is busy."""
@@ -152,10 +151,3 @@ def _require_alive(supervisor: Supervisor) -> None:
     for name, status in supervisor.ended().items():
         if name != "recorder-1":
             raise Unavailable(f"ended with status {status} before it was ready", where=name)
-
-
-def free_endpoint() -> str:
-    """An endpoint on a loopback port that was free a moment ago."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import msgspec
 
-from oxbow.bus import Bus
+from oxbow.bus.client import Bus
 from oxbow.client import Client
 from oxbow.contracts import MissionStatus, any_introspection_key
 from oxbow.errors import OxbowError, Unavailable

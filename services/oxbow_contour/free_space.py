@@ -10,6 +10,7 @@ import shapely
 from shapely import Polygon
 
 from oxbow.errors import Internal
+from oxbow.tolerances import DISTANCE_ROUNDING
 from oxbow_contour.erosion import erode
 from oxbow_contour.simplification import Simplified, simplify
 from oxbow_contour.verification import inscribed_radius_m, is_safe
@@ -34,9 +35,6 @@ Round corners are eroded as far too much, at most.
 
 EXACT = 1e-4
 """How much of the largest safety distance may be lost to erosion, relative."""
-
-ROUNDING = 1e-9
-"""Of coordinates, relative."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +114,7 @@ def _shrunk(simplified: Simplified, safety_m: float) -> list[Polygon]:
     water as it is in the simplified. Each point of the true contours is within t of a simplified one, hence
     at least `safety_m` away from p. The new contours, in turn, are simplified within a slack eroded before.
     """
-    rounding_m = ROUNDING * simplified.extent_m
+    rounding_m = DISTANCE_ROUNDING * simplified.extent_m
     slack_m = SLACK * simplified.tolerance_m + rounding_m
     parts = erode(simplified.parts, safety_m + simplified.tolerance_m + slack_m + rounding_m, slack_m)
     return [part for part in shapely.simplify(parts, slack_m) if part.area > 0]

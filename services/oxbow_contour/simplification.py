@@ -10,14 +10,11 @@ import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 
 from oxbow.arrays import FloatArray, Indices, Mask
+from oxbow.tolerances import DISTANCE_ROUNDING
 from oxbow_contour.rings import rings_of
 from oxbow_contour.strips import deviations, strip_ends
 
 __all__ = ["Simplified", "simplify"]
-
-
-ROUNDING = 1e-9
-"""Of distances, relative."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +114,9 @@ class _Edges:
 
     def is_wide(self, tolerance_m: float) -> Mask:
         """Whether an edge is a strip that does not hold its points."""
-        return self.is_strip & (deviations(self.points, self.first, self.last) > tolerance_m * (1 + ROUNDING))
+        return self.is_strip & (
+            deviations(self.points, self.first, self.last) > tolerance_m * (1 + DISTANCE_ROUNDING)
+        )
 
     def is_met(self) -> Mask:
         """Whether an edge is a strip that meets another edge than its neighbours."""

@@ -9,15 +9,13 @@ import numpy as np
 import shapely
 from shapely import Polygon, STRtree
 
+from oxbow.tolerances import DISTANCE_ROUNDING
 from oxbow_contour.rings import rings_of, runs_of
 
 __all__ = ["inscribed_radius_m", "is_safe", "rounded_down"]
 
 SHORE_RUN = 32
 """Edges of the true shore that are looked at together."""
-
-ROUNDING = 1e-9
-"""Of distances, relative."""
 
 
 def is_safe(free: Polygon, water: Sequence[Polygon], safety_m: float) -> bool:
@@ -41,7 +39,7 @@ def is_safe(free: Polygon, water: Sequence[Polygon], safety_m: float) -> bool:
         return False
     edges = STRtree(np.concatenate([runs_of(ring, 1) for ring in rings_of(free)]))
     runs = np.concatenate([runs_of(ring, SHORE_RUN) for ring in shore])
-    near, _ = edges.query(runs, predicate="dwithin", distance=safety_m * (1 - ROUNDING))
+    near, _ = edges.query(runs, predicate="dwithin", distance=safety_m * (1 - DISTANCE_ROUNDING))
     return not len(near)
 
 

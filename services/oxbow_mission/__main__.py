@@ -10,7 +10,8 @@ from pathlib import Path
 
 import platformdirs
 
-from oxbow.bus import DEFAULT_ENDPOINT, Bus
+from oxbow.bus import DEFAULT_ENDPOINT
+from oxbow.bus.client import Bus
 from oxbow.errors import Internal, OxbowError, Unavailable
 from oxbow.runtime.lifetime import Lifetime
 from oxbow_mission.checks import Checks

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import msgspec
 
-from oxbow.bus import Bus, BusCall
+from oxbow.bus.client import Bus, BusCall
 from oxbow.bus.query import MSGPACK
 from oxbow.contracts import STAGES, any_layer_key, layer_key
 from oxbow.errors import DeadlineExceeded, ErrorReply, Internal, OxbowError, Unavailable, described

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sized
 
 import msgspec
 
-from oxbow.bus import Bus
+from oxbow.bus.client import Bus
 from oxbow.bus.mailbox import Mailbox
 from oxbow.bus.query import Query
 from oxbow.contracts import (

@@ -19,7 +19,7 @@ from lakes import lake
 from results import Figure, Goal, Section, middle
 
 import oxbow
-from oxbow.bus import Bus, BusCall
+from oxbow.bus.client import Bus, BusCall
 from oxbow.bus.router import free_endpoint
 from oxbow.contracts import ANY, STAGES, MissionKey, MissionState, MissionStatus
 from oxbow.mission.file import Mission, PlanOptions, write_mission

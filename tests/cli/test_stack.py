@@ -12,7 +12,8 @@ import psutil
 import pytest
 
 from oxbow import Client
-from oxbow_cli.stack import SERVICES, free_endpoint
+from oxbow.bus.router import free_endpoint
+from oxbow_cli.stack import SERVICES
 
 pytestmark = pytest.mark.processes
 

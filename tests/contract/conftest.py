@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from bus_processes import Replica, end, launch, wait_until
 
-from oxbow.bus import Bus, BusCall
+from oxbow.bus.client import Bus, BusCall
 from oxbow.bus.router import RouterProcess, start_router
 
 

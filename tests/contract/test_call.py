@@ -11,7 +11,7 @@ import shapely
 from bus_processes import end, launch, wait_until
 from echo_stage import ECHO, SQUARE, Deed, EchoRequest, handle
 
-from oxbow.bus import Bus, BusCall
+from oxbow.bus.client import Bus, BusCall
 from oxbow.bus.router import RouterProcess
 from oxbow.contracts import ANY_LAYER, Call
 from oxbow.errors import Infeasible, InvalidMission, OxbowError

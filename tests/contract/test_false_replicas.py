@@ -12,7 +12,8 @@ import pytest
 from bus_processes import end, launch, wait_until
 from echo_stage import ECHO, SQUARE, Echo, EchoRequest
 
-from oxbow.bus import Bus, BusCall, Envelope
+from oxbow.bus import Envelope
+from oxbow.bus.client import Bus, BusCall
 from oxbow.bus.query import MSGPACK, Query
 from oxbow.bus.router import RouterProcess
 from oxbow.contracts import Endpoint

@@ -17,7 +17,8 @@ import pytest
 from bus_processes import Replica, end, launch, run_python, wait_gone, wait_until
 from echo_stage import ECHO, SQUARE, Deed, EchoRequest
 
-from oxbow.bus import Bus, BusCall, Envelope
+from oxbow.bus import Envelope
+from oxbow.bus.client import Bus, BusCall
 from oxbow.bus.router import RouterProcess
 from oxbow.contracts import INTROSPECTION, MAX_REQUEST_BYTES, any_introspection_key
 from oxbow.errors import Busy, DeadlineExceeded, Infeasible, Internal, InvalidMission, OxbowError, Unavailable

@@ -21,7 +21,7 @@ from bus_processes import end, wait_until
 from mutations import mutated
 from shapely import Point, Polygon
 
-from oxbow.bus import Bus, BusCall
+from oxbow.bus.client import Bus, BusCall
 from oxbow.bus.router import RouterProcess
 from oxbow.contracts import CONTOUR, DECOMPOSE, ContourRequest, DecomposeRequest, Endpoint, FreeSpace, Message
 from oxbow.errors import OxbowError

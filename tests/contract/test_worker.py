@@ -15,7 +15,8 @@ import pytest
 from bus_processes import wait_gone, wait_until
 from echo_stage import ECHO, SQUARE, Deed, Echo, EchoRequest
 
-from oxbow.bus import Bus, Envelope, Session
+from oxbow.bus import Envelope, Session
+from oxbow.bus.client import Bus
 from oxbow.bus.router import RouterProcess
 from oxbow.errors import DeadlineExceeded, ErrorCode, Infeasible, Internal, OxbowError
 from oxbow.stage.service import Stage

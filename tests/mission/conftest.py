@@ -9,7 +9,7 @@ import pytest
 from mission_processes import STAGES, START_S, Process, end, launch
 
 from oxbow import Client
-from oxbow.bus import Bus
+from oxbow.bus.client import Bus
 from oxbow.bus.router import start_router
 
 

@@ -17,7 +17,7 @@ from mission_files import listening, mission_file, revision_of
 from mission_processes import STAGES, end, launch
 
 from oxbow import Client
-from oxbow.bus import Bus
+from oxbow.bus.client import Bus
 from oxbow.bus.router import start_router
 from oxbow.contracts import PLAN_KEY, MissionState, MissionStatus, live_key, mission_key
 from oxbow.errors import Cancelled, ErrorCode, Internal, InvalidMission, OxbowError

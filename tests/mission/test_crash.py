@@ -18,7 +18,7 @@ import pytest
 from mission_files import INFEASIBLE_SEED, POISON_SEED, listening, mission_file, revision_of
 
 from oxbow import Client
-from oxbow.bus import Bus
+from oxbow.bus.client import Bus
 from oxbow.contracts import MissionState, MissionStatus
 from oxbow.errors import Internal, Unavailable
 from oxbow.mission.file import parse_mission

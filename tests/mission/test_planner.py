@@ -11,7 +11,7 @@ import msgspec
 import pytest
 from mission_processes import STAGES, end, launch
 
-from oxbow.bus import Bus
+from oxbow.bus.client import Bus
 from oxbow.contracts import MissionState, MissionStatus
 from oxbow.errors import ErrorCode
 from oxbow.planning.submission import SubmissionParameters

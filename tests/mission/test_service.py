@@ -14,7 +14,7 @@ import pytest
 from mission_files import BLOOM, BROKEN_SEED, INFEASIBLE_SEED, Samples, listening, mission_file, revision_of
 
 from oxbow import Client
-from oxbow.bus import Bus
+from oxbow.bus.client import Bus
 from oxbow.contracts import PLAN_KEY, MissionState, MissionStatus, mission_key
 from oxbow.errors import DeadlineExceeded, ErrorCode, Infeasible, Internal, InvalidMission
 from oxbow.mission.file import parse_mission

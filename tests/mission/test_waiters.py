@@ -9,7 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
 
-from oxbow.bus import Bus
+from oxbow.bus.client import Bus
 from oxbow.bus.query import Query
 from oxbow.errors import Busy, DeadlineExceeded, Unavailable
 from oxbow_mission import waiters as bounds

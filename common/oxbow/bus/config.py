@@ -10,10 +10,10 @@ import zenoh
 
 from oxbow.errors import InvalidMission
 
-__all__ = ["DEFAULT_ENDPOINT", "client_config", "router_config"]
+__all__ = ["DEFAULT_ENDPOINT", "client_config", "require_endpoint", "router_config"]
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-_ENDPOINT = re.compile(r"[a-z0-9]+/\S+")
+_ENDPOINT = re.compile(r"[a-z][a-z0-9_-]*/\S+")
 
 _COMMON: dict[str, Any] = {
     # Processes meet at the router they are told of, and nowhere else.
@@ -45,12 +45,10 @@ def router_config(endpoint: str) -> zenoh.Config:
     return _config({"mode": "router", "listen/endpoints": [endpoint], "scouting/delay": 0})
 
 
-def require_endpoint(endpoint: str) -> None:
+def require_endpoint(endpoint: str, where: str = "endpoint") -> None:
     """Check that an endpoint has a protocol and an address."""
     if not _ENDPOINT.fullmatch(endpoint):
-        raise InvalidMission(
-            f"is {endpoint!r}; expected protocol/address as in {DEFAULT_ENDPOINT}", where="endpoint"
-        )
+        raise InvalidMission(f"is {endpoint!r}; expected PROTOCOL/ADDRESS, as {DEFAULT_ENDPOINT}", where=where)
 
 
 def _config(settings: dict[str, Any]) -> zenoh.Config:

@@ -16,7 +16,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TypedDict, TypeVar, Unpack
 
-from oxbow.bus import DEFAULT_ENDPOINT, Bus, Subscription
+from oxbow.bus import DEFAULT_ENDPOINT, Subscription
+from oxbow.bus.client import Bus
 from oxbow.client.updates import ANSWER_S, PlanUpdates, kept_plan, read_status
 from oxbow.contracts import (
     ANY,

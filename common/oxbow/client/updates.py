@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from oxbow.bus import Bus
+from oxbow.bus.client import Bus
 from oxbow.contracts import ANY, MissionKey, MissionStatus
 from oxbow.contracts.ids import excerpt
 from oxbow.errors import InvalidMission, OxbowError, Unavailable

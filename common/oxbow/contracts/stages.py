@@ -43,7 +43,7 @@ class Endpoint(Generic[Q, R]):
 
 
 class Call(Protocol):
-    """Ask a stage: over the bus (`oxbow.bus.BusCall`) or in this process (`oxbow.stage.local.LocalCall`).
+    """Ask a stage: over the bus (`oxbow.bus.client.BusCall`) or in this process (`oxbow.stage.local.LocalCall`).
 
     `part` names the vehicle or the role that is asked about, where a mission has several, for recordings.
     """

@@ -19,7 +19,7 @@ from oxbow.site.weights import planar
 
 __all__ = ["HotSpots", "Overlap", "first_overlap", "hot_spots"]
 
-ROUNDING = 1e-3
+LEAST_PART = 1e-3
 """Less of a hot spot than this share is rounding: of what it shares with another, and of what of it is water."""
 
 
@@ -100,7 +100,7 @@ def first_overlap(spots: Sequence[HotSpot]) -> Overlap | None:
     one, other = one[one < other], other[one < other]
     shared_m2 = shapely.area(shapely.intersection(areas[one], areas[other]))
     smaller_m2 = np.minimum(shapely.area(areas[one]), shapely.area(areas[other]))
-    for pair in np.flatnonzero(shared_m2 > ROUNDING * smaller_m2)[:1].tolist():
+    for pair in np.flatnonzero(shared_m2 > LEAST_PART * smaller_m2)[:1].tolist():
         return Overlap(spots[one[pair]], spots[other[pair]], float(shared_m2[pair]))
     return None
 
@@ -118,7 +118,7 @@ def _worth(feature: PriorFeature, where: str) -> float:
 
 def _require_water(geometry: BaseGeometry, water: BaseGeometry, frame: Frame, where: str) -> None:
     wet = geometry.intersection(water)
-    if wet.is_empty or wet.area < ROUNDING * geometry.area:
+    if wet.is_empty or wet.area < LEAST_PART * geometry.area:
         long, lat = frame.to_degrees(shapely.get_coordinates(geometry.representative_point()))[0]
         raise InvalidMission(
             f"is a hot spot on land or in a forbidden zone, at lat {lat:.6f}, long {long:.6f}; expected one in the"

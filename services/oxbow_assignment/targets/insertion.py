@@ -9,7 +9,7 @@ import numpy as np
 
 from oxbow.arrays import FloatArray, Indices
 from oxbow_assignment.targets.assignment import tour_figures, tour_length
-from oxbow_assignment.targets.problem import COST, LENGTH, ROUNDING, Problem
+from oxbow_assignment.targets.problem import COST, LENGTH, SUM_ROUNDING, Problem
 
 __all__ = ["inserted", "traded", "trimmed"]
 
@@ -127,7 +127,7 @@ def _offers(problem: Problem, vehicle: int, path: Indices, held: int, pool: Indi
     now = tour_figures(problem, vehicle, path)
     kept = own[:, before, after] if len(path) > 2 else np.zeros((2, 1))
     added = own[:, pool[:, None], before] + own[:, pool[:, None], after] - kept[:, None]
-    limit_m = problem.lengths_m[vehicle] * (1.0 - ROUNDING if len(path) > 2 else 1.0)
+    limit_m = problem.lengths_m[vehicle] * (1.0 - SUM_ROUNDING if len(path) > 2 else 1.0)
     fits = problem.has_role[vehicle, pool, None] & (now[LENGTH] + added[LENGTH] <= limit_m)
     detours = np.where(fits, added[COST], np.inf)
     places = detours.argmin(axis=1)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from oxbow.arrays import FloatArray, Indices, Mask
-from oxbow_assignment.targets.problem import COST, LENGTH, ROUNDING, Problem
+from oxbow_assignment.targets.problem import COST, LENGTH, SUM_ROUNDING, Problem
 
 __all__ = ["Layout"]
 
@@ -92,7 +92,7 @@ class Layout:
         self, one: Indices, new_one: FloatArray, other: Indices, new_other: FloatArray, possible: Mask
     ) -> FloatArray:
         """What the objective gains if two tours get new figures; -inf where a tour would be too long."""
-        strain, limits = self.problem.strain, self.problem.lengths_m * (1.0 - ROUNDING)
+        strain, limits = self.problem.strain, self.problem.lengths_m * (1.0 - SUM_ROUNDING)
         fits = (new_one[LENGTH] <= limits[one]) & (new_other[LENGTH] <= limits[other])
         before = strain(self.totals[COST, one], one) + strain(self.totals[COST, other], other)
         costs = np.maximum(new_one[COST], 0.0), np.maximum(new_other[COST], 0.0)

@@ -17,13 +17,13 @@ from oxbow.arrays import FloatArray, Indices, Mask
 from oxbow.contracts import Role, Vehicle
 from oxbow.errors import InvalidMission
 
-__all__ = ["COST", "LENGTH", "ROUNDING", "Objective", "Problem", "require_distances"]
+__all__ = ["COST", "LENGTH", "SUM_ROUNDING", "Objective", "Problem", "require_distances"]
 
 COST, LENGTH = 0, 1
 """The two figures of a route, first index of arrays that have both."""
 
 
-ROUNDING = 1e-12
+SUM_ROUNDING = 1e-12
 """Lengths that are the same sum in another order differ by less than this share."""
 
 SYMMETRY = 1e-6

@@ -17,7 +17,7 @@ __all__ = ["chord", "parallel_passes", "passes_needed"]
 HEADINGS = 4
 """How many headings are tried, of least width across."""
 
-ROUNDING = 1e-6
+SWATH_SLACK = 1e-6
 """Of a swath: a region wider by less needs no further pass."""
 
 NEGLIGIBLE = 1e-3
@@ -95,7 +95,7 @@ def _stripes(region: BaseGeometry, free: Polygon, swath_m: float, heading: float
     """One pass along the middle of each band, wherever the band holds water of the region."""
     turn = np.array([[math.cos(heading), -math.sin(heading)], [math.sin(heading), math.cos(heading)]])
     x0, y0, x1, y1 = _bounds(region, turn)
-    count = max(1, math.ceil((y1 - y0) / swath_m - ROUNDING))
+    count = max(1, math.ceil((y1 - y0) / swath_m - SWATH_SLACK))
     floors = y0 + (y1 - y0) / count * np.arange(count)
     ones = np.ones(count)
     bands = shapely.box((x0 - 1.0) * ones, floors, (x1 + 1.0) * ones, floors + (y1 - y0) / count)
