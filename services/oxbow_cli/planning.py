@@ -13,6 +13,8 @@ from pathlib import Path
 from types import FrameType
 from typing import TypeVar
 
+import msgspec
+
 from oxbow.bus.router import free_endpoint
 from oxbow.client import Client
 from oxbow.contracts import Call, Endpoint, Message, MissionStatus
@@ -78,18 +80,12 @@ def plan_on(job: Job, endpoint: str) -> Planned:
     def note(status: MissionStatus) -> None:
         job.progress(status.stage or status.state, status.fraction)
 
-    options = job.options
     with _named_timeout(job.timeout_s), Client(endpoint, timeout_s=CONNECT_S) as client:
         planned = client.plan(
             job.mission,
             timeout_s=job.timeout_s,
             on_status=note,
-            method=options.method,
-            seed=options.seed,
-            heading_rad=options.heading_rad,
-            time_limit_s=options.time_limit_s,
-            smooth=options.smooth,
-            draw=options.draw,
+            **msgspec.structs.asdict(job.options),
         )
     job.keep(planned)
     return Planned(planned)
