@@ -14,10 +14,17 @@ __all__ = ["require_conforming"]
 def require_conforming(path: LineString, request: PathRequest) -> None:
     """Check that a path is simple, no longer than allowed, and inside the free space but for its legs.
 
+    Parameters
+    ----------
+    path
+        In the planar frame, from launch to recovery.
+    request
+        The free space, the longest length, and both points.
+
     Raises
     ------
     Internal
-        It is not: a fault of the planner, which must not reach a vehicle.
+        The path breaks one of these rules: a fault of the planner, which must not reach a vehicle.
     """
     if not path.is_simple:
         raise Internal("the planned path crosses itself", "path")

@@ -34,7 +34,7 @@ def dropped_parts(path: LineString, free: Polygon, reach_m: float, *, is_spent: 
     reach_m
         What is nearer counts as seen.
     is_spent
-        Whether the path uses the length that there is: what is left away says why.
+        Whether the path uses the length that there is: the reason that is given depends on it.
     """
     why = SPENT if is_spent else UNREACHED
     coarse = path.simplify(DETAIL * reach_m)

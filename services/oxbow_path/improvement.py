@@ -16,7 +16,23 @@ __all__ = ["improved", "method_plan", "spacing_steps"]
 
 
 def improved(path: Polyline, task: Task, display: Display) -> LineString:
-    """The path refined for the task; one already longer than is useful may stay as long."""
+    """The path refined for the task; one already longer than is useful may stay as long.
+
+    Parameters
+    ----------
+    path
+        Simple, and inside the free space but for its legs.
+    task
+        The water, its samples, and the length that there is.
+    display
+        Shows every step.
+
+    Returns
+    -------
+    LineString
+        No longer than the budget, unless no refinement made the given path fit.
+    """
+    # A path that fits keeps its length, even where less would be useful: shortening it would open gaps.
     fits = task.budget.fits(path.length_m)
     return refined(
         path,
@@ -31,7 +47,15 @@ def improved(path: Polyline, task: Task, display: Display) -> LineString:
 
 
 def method_plan(path: LineString, fit: Fit) -> MethodPlan:
-    """The plan of a method that fits a spacing: the path that the chosen trial became, and all trials."""
+    """The plan of a method that fits a spacing.
+
+    Parameters
+    ----------
+    path
+        What the chosen trial became when it was refined.
+    fit
+        The chosen trial, and all others.
+    """
     chosen = fit.chosen.pattern
     return MethodPlan(path, chosen.spacing_m, chosen.reach_m, spacing_steps(fit.trials))
 

@@ -32,16 +32,39 @@ METHODS: dict[Method, PathMethod] = {
 }
 
 WIDEST = 2.0
-"""No plan claims a wider spacing than so many nominal ones: what it leaves farther away is named as dropped."""
+"""Widest spacing that a plan claims, in nominal ones: what it leaves farther away is named as dropped."""
 
 
 def handle(request: PathRequest, show: Show) -> PathPlan:
-    """Plan a path by the requested method, check it, and show how it came about."""
+    """Plan a path by the requested method, check it, and show how it came about.
+
+    Parameters
+    ----------
+    request
+        The water, its cells, the method and the longest length.
+    show
+        Receives the layers of the method, and the path.
+
+    Returns
+    -------
+    PathPlan
+        A path that keeps to the rules of `require_conforming`, and the water that it leaves far away.
+    """
     return planned(request, _stop(request.time_limit_s), show)
 
 
 def planned(request: PathRequest, stop: Stop, show: Show) -> PathPlan:
-    """See `handle`; `stop` tells whether the request's time limit is up."""
+    """Plan as `handle` does, with a clock of the caller's.
+
+    Parameters
+    ----------
+    request
+        The water, its cells, the method and the longest length.
+    stop
+        Whether time is up; it replaces the request's time limit.
+    show
+        Receives the layers of the method, and the path.
+    """
     task = Task.of(request, stop)
     display = Display(show, request.decomposition.heading_rad)
     plan = best_plan(METHODS[request.method], task, display)
@@ -70,7 +93,7 @@ def _smoothed(path: LineString, task: Task) -> LineString:
 
 
 def _stop(limit_s: float | None) -> Stop:
-    """Tells whether the time is up, from now on; without a limit it never is."""
+    """Whether the time is up, counted from now; without a limit it never is."""
     if limit_s is None:
         return lambda: False
     end_s = time.monotonic() + limit_s

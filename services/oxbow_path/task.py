@@ -34,28 +34,28 @@ Stop = Callable[[], bool]
 STAGE = "path"
 
 FINEST = 120
-"""At most so many spacings make up the root of the water's area: waypoints, and the work, grow with its square."""
+"""The root of the water's area is at most this many spacings: waypoints, and the work, grow with its square."""
 
 FINEST_ALONG = 10_000
-"""At most so many spacings make up the length of the shore: of canals, more than of the root of the area."""
+"""The length of the shore is at most this many spacings: in canals this bound is the tighter one."""
 
 PROBE_PITCH = 0.35
 """Pitch of the probe grid, in nominal spacings."""
 
 SAMPLE_PITCH = 0.215
-"""Pitch of the samples, in nominal spacings: 25 a square of one spacing."""
+"""Pitch of the samples, in nominal spacings: 25 per square of one spacing."""
 
 SHOWN_EVERY = 10
-"""Of the steps of an improvement, one in so many is shown with its path."""
+"""One step of an improvement in this many is shown with its path."""
 
 FINEST_M = 0.1
-"""No less spacing is planned, however small the water: vehicles are not narrower."""
+"""The least spacing planned, however small the water: vehicles are not narrower."""
 
 GATES_ALONG = 15_000
-"""Routes pass the water through about so many gates at most."""
+"""Routes divide the water by at most about this many gates along its shore."""
 
 MOST_SAMPLES = 100_000
-"""Of more samples, or places of the probe, than about these, the pitch is widened."""
+"""Where there would be more samples, or places of the probe, than about this many, their pitch is widened."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +83,13 @@ class Task:
     def of(cls, request: PathRequest, stop: Stop) -> Task:
         """Turn a request into the sweep frame, and prepare what all methods share.
 
+        Parameters
+        ----------
+        request
+            What is asked, in the planar frame.
+        stop
+            Whether time is up.
+
         Raises
         ------
         Infeasible
@@ -105,7 +112,7 @@ class Task:
 
     @property
     def enough_m(self) -> float:
-        """So near to all water, a path need come no nearer: half the least spacing, or 0 where length is short."""
+        """A path this near to all water is good enough: half the least spacing, or 0 where length is short."""
         return self.spacing_m / 2 if self.spacing_m <= self.budget.least_spacing_m else 0.0
 
     @cached_property
@@ -163,16 +170,46 @@ class Display:
     def lines(
         self, name: str, lines: Sequence[BaseGeometry], *, step: int = 0, labels: tuple[str, ...] = ()
     ) -> None:
-        """Show geometry of the sweep frame."""
+        """Show geometry of the sweep frame.
+
+        Parameters
+        ----------
+        name
+            Of the layer.
+        lines
+            Geometries of any kind, in the sweep frame.
+        step
+            The iteration that they belong to.
+        labels
+            One per geometry, or none.
+        """
         turned = shapely.transform(np.asarray(lines, dtype=object), self.back) if len(lines) else ()
         self.show(Layer(stage=STAGE, name=name, step=step, geometries=tuple(turned), labels=labels))
 
     def figures(self, name: str, figures: dict[str, float], *, step: int = 0) -> None:
-        """Show figures of one step."""
+        """Show figures of one step.
+
+        Parameters
+        ----------
+        name
+            Of the layer.
+        figures
+            Named values, their units in their names.
+        step
+            The iteration that they belong to.
+        """
         self.show(Layer(stage=STAGE, name=name, kind=LayerKind.SCALARS, step=step, scalars=figures))
 
     def refinement(self, number: int, step: RefinementStep) -> None:
-        """Show where a refinement stands: its figures at every step, the path at some."""
+        """Show where a refinement stands: its figures at every step, the path at some.
+
+        Parameters
+        ----------
+        number
+            Of the step, from 0 for the path as it was given.
+        step
+            The path, and how far the samples are from it.
+        """
         figures = {"length_m": step.length_m, "largest_distance_m": step.largest_m, "p95_distance_m": step.p95_m}
         self.figures("refinement", figures, step=number)
         if number % SHOWN_EVERY == 0:
@@ -184,7 +221,7 @@ class Display:
 
 
 def finest_spacing_m(space: FreeSpace) -> float:
-    """The least spacing that is planned: finer sampling of small waters takes long, and serves no one.
+    """The least spacing that is planned: finer sampling of small waters takes long and serves no purpose.
 
     Rendas and Li 2016, section 1.2.1.2, find that the spacing needs a least value for small sites.
     """
@@ -197,7 +234,15 @@ def _pitch_m(free: Polygon, wanted_m: float) -> float:
 
 
 def prepared_waters(request: PathRequest, spacing_m: float) -> Waters:
-    """The waters of a request, in the sweep frame, for paths of about a given spacing."""
+    """The waters of a request, in the sweep frame.
+
+    Parameters
+    ----------
+    request
+        What is asked, in the planar frame.
+    spacing_m
+        The nominal spacing, which scales the pitch of the probe and the detail of routes.
+    """
     turn = partial(to_sweep, heading_rad=request.decomposition.heading_rad)
     free, water = (shapely.transform(polygon, turn) for polygon in (request.space.free, request.space.water))
     shapely.prepare([free, water])

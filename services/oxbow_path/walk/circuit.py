@@ -73,6 +73,7 @@ def plan_circuit(
 
 def _spanning_tree(cells: Sequence[Cell], transects: Sequence[Transect]) -> nx.Graph[Node]:
     """The least tree over transects and slots; slots that lead to no transect are dropped."""
+    # Weights are distances in u, between transects and the middles of slots: the tree crosses short slots first.
     graph: nx.Graph[Node] = nx.Graph()
     slots = _slots(cells, transects)
     for index, transect in enumerate(transects):
@@ -90,6 +91,7 @@ def _spanning_tree(cells: Sequence[Cell], transects: Sequence[Transect]) -> nx.G
     leaves = [node for node in tree if node[0] == "slot" and tree.degree(node) <= 1]
     while leaves:
         leaf = leaves.pop()
+        # Two slots joined to each other alone are both queued at first, and the second again when the first goes.
         if leaf not in tree:
             continue
         neighbours = list(tree.neighbors(leaf))
@@ -214,10 +216,12 @@ def _crossing(cell: Cell, start: tuple[float, float], end: tuple[float, float]) 
         return np.array([start, end])
     us, floor, ceiling = _profile(cell, start[0], end[0])
     (u0, v0), (u1, v1) = sorted([start, end])
+    # A cell has no height at a critical point where its chains meet.
     height = np.maximum(ceiling - floor, 1e-12)
     first, last = (v0 - floor[0]) / height[0], (v1 - floor[-1]) / height[-1]
     share = np.clip(np.interp(us, [u0, u1], [first, last]), 0.0, 1.0)
     vs = floor + share * (ceiling - floor)
+    # Links have to meet transects and other links exactly, or the circuit falls apart.
     vs[0], vs[-1] = v0, v1
     curve = np.column_stack([us, vs])
     return curve if start[0] <= end[0] else curve[::-1]

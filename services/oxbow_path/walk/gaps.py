@@ -27,6 +27,26 @@ def reach_gaps(
 
     Outside the region, a gap is reached by a branch, which is walked on both sides: it costs twice its length.
     Inside it, where bands have merged, the gap is opened by a slit from the boundary.
+
+    Parameters
+    ----------
+    walk
+        The region so far.
+    brush
+        Makes branches into bands.
+    probe
+        The places that have to be within reach.
+    routes
+        Ways through the free space.
+    reach_m
+        How far water may be from the path.
+    cut_width_m
+        Width of slits, and of the cuts that open holes.
+
+    Returns
+    -------
+    Walk
+        A simply connected region; gaps are left in it where `ROUNDS` did not suffice.
     """
     for _ in range(ROUNDS):
         distance = probe.distances(walk.ring)
@@ -36,6 +56,7 @@ def reach_gaps(
             break
         inside = shapely.contains_xy(walk.region, gaps[:, 0], gaps[:, 1])
         apart_m = reach_m + brush.half_width_m
+        # Longer than to the ring, so that a slit breaks through it.
         slits = [
             shapely.buffer(_lengthened(shapely.shortest_line(Point(gap), walk.ring), cut_width_m), cut_width_m / 2)
             for gap in _spread(gaps[inside], apart_m)
@@ -68,6 +89,7 @@ def _branches(
             continue
         branch = _straight(gap, region, routes, brush.half_width_m)
         if branch is None:
+            # One search from the region serves all gaps of the round that are out of sight; most rounds need none.
             inward = inward or routes.into(region, routes.goals_in(region))
             branch = inward.route(gap, brush.margin_m) or shapely.shortest_line(Point(gap), region)
         yield _shortened(branch, min(brush.margin_m, branch.length / 2))
@@ -80,7 +102,26 @@ def _branches(
 
 
 def branch_to(gap: FloatArray, region: Polygon, routes: Routes, goals: Indices, overlap_m: float) -> LineString:
-    """From a gap straight to the region where the water allows, else along the middle of the water."""
+    """From a gap straight to the region where the water allows, else along the middle of the water.
+
+    Parameters
+    ----------
+    gap
+        A place, shape (2,), in metres.
+    region
+        Where the branch ends.
+    routes
+        Ways through the free space.
+    goals
+        Where these ways may enter the region: `routes.goals_in(region)`.
+    overlap_m
+        How far a straight branch runs on into the region.
+
+    Returns
+    -------
+    LineString
+        From the gap to the region; straight over land where no way leads there.
+    """
     straight = _straight(gap, region, routes, overlap_m)
     if straight is not None:
         return straight

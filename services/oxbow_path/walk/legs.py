@@ -41,13 +41,13 @@ OTHER_DETAIL = 0.83
 """Change of the detail from one attempt to the next."""
 
 NEAR = 1.0
-"""Places so near to each other, in details of the way through the region, need no way through it."""
+"""Places nearer to each other than this, in details of the way through the region, need no way through it."""
 
 SKIPPED = 2.0
-"""So much of the ring, in the same measure, may lie between them and not be travelled."""
+"""At most this much of the ring, in the same measure, may lie between them and be left out."""
 
 SIGHTS = 200
-"""How many places of the ring, nearest first, are tried for one in sight of an entry."""
+"""At most this many places of the ring, the nearest, are tried for one in sight of an entry."""
 
 BESIDE = (0.0, 0.5, -0.5, 1.0, -1.0)
 """Where the opening's middle is tried, in openings from where the leg meets the ring: beside it, where the leg
@@ -61,9 +61,14 @@ HALVINGS = 12
 class Access:
     """How a launch or recovery point is reached: `leg` runs from it to the free space, through the water.
 
-    A point inside the free space has a leg of no length. That of a point ashore runs `land_m` straight over land
-    first, to its second vertex. `beside` is where the way back may run: a tenth of the leg's length to either
-    side, in the water.
+    Parameters
+    ----------
+    leg : array, shape (n, 2)
+        From the point to the free space, in metres; two equal vertices where the point lies inside it.
+    land_m
+        How far the leg runs straight over land first, to its second vertex; 0 for a point in the water.
+    beside
+        Where the way back may run: up to a tenth of the leg's length to either side, in the water.
     """
 
     leg: FloatArray
@@ -138,6 +143,17 @@ def access(place: Place, free: Polygon, water: Routes, *, where: str) -> Access:
     it; else along the middle of the water, pulled tight wherever that keeps half the safety distance from the
     shore.
 
+    Parameters
+    ----------
+    place
+        The point, (x, y) in metres.
+    free
+        The free space.
+    water
+        Ways through the water that the free space lies in.
+    where
+        What errors name the point by: `LaunchPoint` or `RecoveryPoint`.
+
     Raises
     ------
     Infeasible
@@ -155,9 +171,12 @@ def access(place: Place, free: Polygon, water: Routes, *, where: str) -> Access:
 
 
 def _pulled_tight(way: FloatArray, free: Polygon, water: BaseGeometry) -> FloatArray:
+    # The way ends where the free space begins: at the safety distance.
     clearance_m = shapely.distance(Point(way[-1]), water.boundary) / 2
     line = LineString(way)
+    # Only the water around the way is eroded: a whole lake would take long.
     around = water.intersection(box(*line.bounds).buffer(5 * clearance_m))
+    # The start may lie on the shore, where erosion leaves no water.
     roomy = around.buffer(-clearance_m).union(Point(way[0]).buffer(4 * clearance_m).intersection(around))
     return np.asarray(shapely.get_coordinates(shapely.get_parts(taut(line, roomy).difference(free))[0]))
 
@@ -201,7 +220,7 @@ def joined(
     Raises
     ------
     Infeasible
-        The water that a leg has to pass is as good as closed.
+        A leg has to pass water too narrow for the way back beside the way out.
     Internal
         No opening gives a simple path: a fault of the construction.
     """
@@ -231,7 +250,7 @@ def _are_legs(outside: BaseGeometry, allowed: BaseGeometry, launch: Access, reco
 
 
 def is_plainly_simple(path: LineString) -> bool:
-    """Simple, and not by rounding alone: still so when turned."""
+    """Whether a path is simple, and stays so when turned: not by rounding alone."""
     return bool(path.is_simple and rotate(path, 1.0, use_radians=True).is_simple)
 
 
@@ -286,10 +305,10 @@ def _meeting(ring: LineString, entry: Point, free: BaseGeometry) -> float:
     places = np.vstack(
         [shapely.get_coordinates(ring.interpolate(ring.project(entry))), shapely.get_coordinates(ring)]
     )
-    here = shapely.get_coordinates(entry)
-    nearest = places[np.argsort(np.hypot(*(places - here).T), kind="stable")[:SIGHTS]]
+    start = shapely.get_coordinates(entry)
+    nearest = places[np.argsort(np.hypot(*(places - start).T), kind="stable")[:SIGHTS]]
     nearest_first = np.asarray(
-        shapely.linestrings(np.stack([np.broadcast_to(here, nearest.shape), nearest], axis=1))
+        shapely.linestrings(np.stack([np.broadcast_to(start, nearest.shape), nearest], axis=1))
     )
     seen = nearest_first[shapely.covers(free, nearest_first)]
     sight = seen[0] if len(seen) else nearest_first[0]
@@ -404,6 +423,7 @@ def _chain(*parts: FloatArray) -> LineString:
     points = np.vstack(parts)
     apart = np.hypot(*np.diff(points, axis=0).T) > ROUNDING_M
     keep = np.concatenate([[True], apart[:-1], [True]])
+    # Of the last two places the end stays, and the one before it goes.
     if not apart[-1]:
         keep[np.flatnonzero(keep[1:-1])[-1] + 1] = False
     return LineString(points[keep])

@@ -16,6 +16,13 @@ def try_transects(waters: Waters, pattern: Pattern) -> Trial:
     """Build the path for one pattern.
 
     The tree is made of transects two spacings apart, so that the legs on their two sides stand one spacing apart.
+
+    Parameters
+    ----------
+    waters
+        The water, its cells, and how launch and recovery points are reached.
+    pattern
+        The spacing, and the phase of the transects.
     """
     transects = place_transects(
         waters.cells,

@@ -31,7 +31,15 @@ class Probe:
 
     @classmethod
     def over(cls, free: Polygon, pitch_m: float) -> Probe:
-        """Cover `free` by a grid, and its shore by points as dense."""
+        """Cover `free` by a grid, and its shore by points as dense.
+
+        Parameters
+        ----------
+        free
+            The free space.
+        pitch_m
+            Distance of neighbouring points of the grid, and the largest along the shore.
+        """
         x0, y0, *_ = free.bounds
         inside = lattice_within(free, (x0 + pitch_m / 2, y0 + pitch_m / 2), pitch_m, pitch_m)
         shore = shapely.get_coordinates(shapely.segmentize(free.boundary, pitch_m))
@@ -54,15 +62,27 @@ class Probe:
     def distances(self, line: BaseGeometry) -> FloatArray:
         """Distance of every probe point to a line, shape (n,)."""
         steps, _ = self.steps([line])
+        # Each tree is queried once: to balance it takes longer than it saves.
         distance, _ = cKDTree(steps, balanced_tree=False, compact_nodes=False).query(self.points)
         return np.asarray(distance)
 
 
 def covered(points: FloatArray, steps: FloatArray, reach_m: float) -> bool:
-    """Whether every point has a step within reach."""
+    """Whether every point has a step within reach.
+
+    Parameters
+    ----------
+    points
+        What has to be covered, shape (n, 2), in metres.
+    steps
+        What covers it, shape (m, 2): points along a path.
+    reach_m
+        The largest distance from a point to its nearest step, itself within reach.
+    """
     if len(points) == 0:
         return True
     if len(steps) == 0:
         return False
+    # The tree leaves out what is exactly at its upper bound.
     distance, _ = cKDTree(steps).query(points, distance_upper_bound=np.nextafter(reach_m, np.inf))
     return bool(np.isfinite(distance).all())

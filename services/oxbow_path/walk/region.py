@@ -35,7 +35,10 @@ MITRE = 1.5
 """Corners of bands are sharp up to this ratio, for few waypoints."""
 
 NARROWINGS = 8
+"""How often cuts are halved in width before the holes that remain are enclosed."""
+
 AREA_TOLERANCE = 1e-6
+"""Share of a region's area that rounding may lose."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,20 @@ class Brush:
         return self.free.buffer(-self.margin_m)
 
     def bands(self, lines: Sequence[LineString], *, flat: bool = False) -> BaseGeometry:
-        """The bands of some lines; with flat ends they end where the lines end."""
+        """The bands of some lines.
+
+        Parameters
+        ----------
+        lines
+            In the free space; those shorter than `LEAST_LINE_M` have no band.
+        flat
+            Whether bands end where their lines end; otherwise they reach half their width beyond.
+
+        Returns
+        -------
+        BaseGeometry
+            The union of all bands, inside the free space; empty without lines.
+        """
         wide, core = (
             shapely.union_all(_dilations(lines, width_m, flat=flat))
             for width_m in (self.half_width_m, CORE * self.half_width_m)
@@ -108,7 +124,20 @@ def _dilations(lines: Sequence[LineString], width_m: float, *, flat: bool) -> li
 
 
 def dilated(circuit: Circuit, brush: Brush) -> Polygon:
-    """The circuit's lines, dilated: transects end where they end, links reach over what they join."""
+    """The circuit's lines, dilated: transects end where they end, links reach over what they join.
+
+    Parameters
+    ----------
+    circuit
+        Lines that are connected.
+    brush
+        How wide the bands are, and where.
+
+    Returns
+    -------
+    Polygon
+        The largest piece, perhaps with holes.
+    """
     return largest(brush.bands(circuit.transects, flat=True).union(brush.bands(circuit.links)))
 
 
@@ -116,6 +145,13 @@ def clear_of_land(region: BaseGeometry, free: Polygon) -> Polygon:
     """The largest part of a region in the free space, with its holes filled: its boundary touches no land.
 
     What a region encloses may be land, and a cut through it may reach that land; it then follows the shore.
+
+    Parameters
+    ----------
+    region
+        May reach beyond the free space.
+    free
+        The free space.
     """
     return Polygon(largest(region.intersection(free)).exterior)
 
@@ -126,6 +162,19 @@ def simply_connected(region: Polygon, free: Polygon, probe: Probe, *, cut_width_
     A hole whose water lies within `reach_m` of the remaining boundary is enclosed: its own ring is not worth
     travelling. Every other hole is opened to the outside by a cut across the region where it is narrowest, so
     that the path runs round it too.
+
+    Parameters
+    ----------
+    region
+        A region in one piece, perhaps with holes.
+    free
+        The free space, to which the walk is clipped.
+    probe
+        The places that have to be within reach of the boundary.
+    cut_width_m
+        Width of the cuts; narrower where one this wide would cut off more than itself.
+    reach_m
+        How far water may be from the path.
     """
     if not region.interiors:
         return Walk(clear_of_land(region, free))
@@ -145,8 +194,10 @@ def _enclose(region: Polygon, probe: Probe, reach_m: float) -> tuple[list[Linear
     steps, owner = steps[order], owner[order]
     kept = np.ones(len(rings), dtype=bool)
     holes = [Polygon(ring) for ring in rings]
+    # Smallest first, for their rings are the least worth travelling; what is enclosed covers nothing from then on.
     for index in sorted(range(1, len(rings)), key=lambda i: holes[i].area):
         served = probe.points[probe.within(holes[index].buffer(reach_m))]
+        # A place to cover lies within reach of the hole, and the step that covers it within reach of the place.
         near = _near(steps, holes[index], 2 * reach_m)
         rest = near[(owner[near] != index) & kept[owner[near]]]
         kept[index] = not covered(served, steps[rest], reach_m)

@@ -21,7 +21,7 @@ from oxbow_path.walk.trial import Trial, Waters, finished, touches_entries
 __all__ = ["with_remainder"]
 
 SPURS = 12
-"""At most so many spurs are added."""
+"""At most this many spurs are added."""
 
 SPUR = 0.12
 """Half width of a spur, in nominal spacings: narrow, so that it parts the water that it runs into."""
@@ -39,6 +39,20 @@ def with_remainder(trial: Trial, waters: Waters, budget: Budget) -> Trial:
     """Add spurs to the worst gaps, one after another, while they fit the length and make no gap deeper.
 
     A trial that uses the length well enough stays as it is: the refinement spends the rest better.
+
+    Parameters
+    ----------
+    trial
+        A path that fits the budget.
+    waters
+        The water that it was made for.
+    budget
+        The longest path, and how much of that is enough.
+
+    Returns
+    -------
+    Trial
+        The trial with its spurs, or itself where none fits.
     """
     if budget.is_enough(trial):
         return trial

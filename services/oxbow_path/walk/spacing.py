@@ -29,7 +29,7 @@ SENSITIVITY = 1.0
 class Budget:
     """The longest path allowed, and how near its legs may come.
 
-    `spent_m` is what the vehicle needs beside the path, which refusals count in.
+    `spent_m` is what the vehicle needs besides the path; refusals count it in.
     """
 
     limit_m: float
@@ -43,7 +43,7 @@ class Budget:
 
     @property
     def enough_m(self) -> float:
-        """How long it should be at least."""
+        """The least length that counts as using the budget."""
         return ENOUGH * self.limit_m
 
     def fits(self, length_m: float) -> bool:
@@ -57,7 +57,7 @@ class Budget:
         return too_short(self.limit_m + self.spent_m, shortest_m + self.spent_m, what=way)
 
     def is_enough(self, trial: Trial) -> bool:
-        """No smaller spacing need be tried."""
+        """Whether no smaller spacing need be tried."""
         return self.fits(trial.length_m) and (
             trial.length_m >= self.enough_m or trial.pattern.spacing_m <= self.least_spacing_m
         )
@@ -117,12 +117,14 @@ def _longest(trials: Sequence[Trial], budget: Budget) -> Trial:
 
 
 def _next_spacing(trials: Sequence[Trial], budget: Budget) -> float:
+    # Length is about a power of the spacing, so that the two are nearly linear in logarithms.
     target = math.log((budget.most_m + budget.enough_m) / 2)
     points = [(math.log(trial.pattern.spacing_m), math.log(trial.length_m)) for trial in trials]
     too_small = max((point for point in points if point[1] > target), default=None)
     too_large = min((point for point in points if point[1] <= target), default=None)
     if too_small is not None and too_large is not None:
         share = (too_small[1] - target) / (too_small[1] - too_large[1])
+        # Interpolation alone may creep towards one end, and length jumps where a transect more fits.
         share = min(max(share, LEAST_STEP), 1 - LEAST_STEP)
         return math.exp(too_small[0] + share * (too_large[0] - too_small[0]))
     sensitivity = SENSITIVITY

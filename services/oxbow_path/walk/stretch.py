@@ -15,6 +15,13 @@ def stretch(line: LineString, start_m: float, end_m: float) -> FloatArray:
     """The vertices (n, 2) of a line from one distance along it to another, or the place alone where these are one.
 
     Distances beyond the line's ends are those of its ends.
+
+    Parameters
+    ----------
+    line
+        Of any length.
+    start_m, end_m
+        Distances along it, in rising order.
     """
     points = shapely.get_coordinates(line)
     at_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])

@@ -28,7 +28,17 @@ class Transect:
 
 
 def sweep_lines(cells: Sequence[Cell], pitch_m: float, phase: float) -> FloatArray:
-    """Abscissae u of the sweep lines over all cells, `pitch_m` apart, the first at `phase` (0..1) of a pitch."""
+    """Abscissae u of the sweep lines over all cells, shape (n,), in rising order.
+
+    Parameters
+    ----------
+    cells
+        The decomposition's cells, in the sweep frame; at least one.
+    pitch_m
+        Distance between neighbouring sweep lines.
+    phase
+        Where the first line stands past the least u of the cells, as a fraction of the pitch.
+    """
     start = min(cell.floor[0, 0] for cell in cells)
     end = max(cell.floor[-1, 0] for cell in cells)
     return np.arange(start + phase * pitch_m, end, pitch_m)

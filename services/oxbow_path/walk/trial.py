@@ -29,7 +29,7 @@ START = 0.1
 """Radius of the region that a path without transects grows from, in nominal spacings."""
 
 SMOOTHINGS = 8
-"""How often a ring that all but touches itself is smoothed, each time by a quarter as much."""
+"""How often a ring that all but touches itself is smoothed, each time a quarter as far as before."""
 
 STRAIGHTENING = 0.05
 """How far the walk may be moved to straighten it, in spacings."""
@@ -109,7 +109,17 @@ class Trial:
 
 
 def walked(waters: Waters, pattern: Pattern, circuit: Circuit) -> Trial:
-    """Walk round a tree of lines, and round branches to what is out of reach of it; from launch to recovery."""
+    """Walk round a tree of lines, and round branches to what is out of reach of it; from launch to recovery.
+
+    Parameters
+    ----------
+    waters
+        The water, and how launch and recovery points are reached.
+    pattern
+        The spacing of the legs, and how far water may be from them.
+    circuit
+        The tree; without transects, the walk starts from the launch point's entry alone.
+    """
     brush = Brush(waters.free, pattern.half_width_m, pattern.trim_m)
     connected = partial(
         simply_connected, free=waters.free, probe=waters.probe, cut_width_m=pattern.cut_m, reach_m=pattern.reach_m
@@ -118,13 +128,26 @@ def walked(waters: Waters, pattern: Pattern, circuit: Circuit) -> Trial:
     walk = reach_gaps(walk, brush, waters.probe, waters.routes, reach_m=pattern.reach_m, cut_width_m=pattern.cut_m)
     region = _straightened(walk.region, waters, STRAIGHTENING * pattern.spacing_m)
     region = connected(_accessible(region, waters, brush)).region
+    # A cut may have parted an entry from the region. What the region encloses once grown back to it is filled.
     if not touches_entries(region, waters):
         region = Polygon(_accessible(region, waters, brush).exterior)
     return finished(waters, pattern, circuit, Walk(region, walk.cuts, walk.enclosed))
 
 
 def finished(waters: Waters, pattern: Pattern, circuit: Circuit, walk: Walk) -> Trial:
-    """A walk that touches both entries, with its legs; smoothed first where its ring all but touches itself."""
+    """A walk that touches both entries, with its legs; smoothed first where its ring all but touches itself.
+
+    Parameters
+    ----------
+    waters
+        The water, and how launch and recovery points are reached.
+    pattern
+        The spacing that scales the smoothing and the ring's opening.
+    circuit
+        The lines that the walk goes round: kept for display.
+    walk
+        A simply connected region whose boundary becomes the path.
+    """
     width_m = STRAIGHTENING * pattern.spacing_m
     for _ in range(SMOOTHINGS):
         if is_plainly_simple(LineString(walk.region.exterior)):
@@ -177,5 +200,13 @@ def _accessible(region: Polygon, waters: Waters, brush: Brush) -> Polygon:
 
 
 def touches_entries(region: Polygon, waters: Waters) -> bool:
-    """Whether the legs can join the region where they end."""
+    """Whether the legs can join the region where they end.
+
+    Parameters
+    ----------
+    region
+        The walk's region.
+    waters
+        The entries of launch and recovery points.
+    """
     return all(shapely.dwithin(region, entry, ROUNDING_M) for entry in waters.entries)
