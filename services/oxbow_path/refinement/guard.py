@@ -19,27 +19,28 @@ from oxbow_path.refinement.polyline import Polyline
 __all__ = ["Guard"]
 
 CLEARANCE = 0.02
-"""Least distance between stretches of the path that are no neighbours, in spacings, unless they began nearer."""
+"""Least distance between stretches of the path that are not neighbours, in spacings, unless they began nearer."""
 
 NEIGHBOURS = 2
-"""Segments so near along the path may come nearer than the clearance: a bend joins them."""
+"""Segments at most this many apart along the path may come nearer than the clearance: a bend joins them."""
 
 HALVINGS = 3
 """How often a node's step is halved before the node stays."""
 
 LOCAL_ROUNDS = 8
-"""After so many rounds the neighbours of what still is at fault stay too."""
+"""After this many rounds the neighbours of what is still at fault stay too."""
 
 ROUNDS = 14
+"""Attempts at a move before the path stays as it is."""
 
 LOCAL = 0.5
 """Where no node moves farther, in spacings, what can come near what is found once for all shares of a move."""
 
 BORDER_PITCH = 0.1
-"""Places of the free space's border stand so far apart, in spacings, where its distance is looked up."""
+"""Distance of the places that stand for the free space's border in look-ups, in spacings."""
 
 FOLD, RETURN = -0.9999, -1.0 + 1e-9
-"""Cosines of the turn at which a node folds its two segments nearly, and as good as wholly, onto each other."""
+"""Cosines of the turn at which a node folds its two segments nearly, and to rounding wholly, onto each other."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +68,17 @@ class Guard:
     def of(cls, free: Polygon, path: Polyline, spacing_m: float) -> Guard:
         """Guard a path; one whose stretches began nearer than the usual clearance may stay half as near.
 
-        So may one that began nearer than rounding, which alone could make a crossing of it: from the mission's
-        plane to degrees and back, say.
+        The same holds for one that began nearer than rounding, which alone could make a crossing of it: from the
+        mission's plane to degrees and back, say.
+
+        Parameters
+        ----------
+        free
+            The free space.
+        path
+            A simple path inside it, but for its legs.
+        spacing_m
+            The nominal spacing, which scales clearance and look-ups.
         """
         grown = free.buffer(ROUNDING_M)
         shapely.prepare(grown)
@@ -95,6 +105,17 @@ class Guard:
 
         Where only some segments are suspect, the others are known to be at fault with none but those. Excused ones
         may come near and fold sharply, but neither meet another nor run back on themselves.
+
+        Parameters
+        ----------
+        path
+            With n nodes.
+        suspect
+            The segments (n - 1,) that are tested, against all others; by default all.
+        excused
+            Segments (n - 1,) that may come near others and fold sharply, as legs may.
+        known
+            Pairs and clearances that hold however the nodes move within some reach; by default those of `path`.
         """
         asked = np.arange(len(path.legs)) if suspect is None else np.flatnonzero(suspect)
         known = known or self._known(path, asked)
@@ -129,6 +150,18 @@ class Guard:
 
         What is too near or too sharp in the path as it is must not hold all the rest: it is excused as soon as
         a segment is at fault that does not move, and in a second attempt from the start.
+
+        Parameters
+        ----------
+        path
+            With n nodes.
+        target
+            Where its nodes are to go, shape (n, 2), in metres; pinned ones stay.
+
+        Returns
+        -------
+        Polyline
+            With the same n nodes; the path itself where no part of the move is sound.
         """
         moved = self._moved(path, target, None)
         if moved is None:
@@ -162,7 +195,15 @@ class Guard:
         return None
 
     def thinned(self, path: Polyline, drop: Mask) -> Polyline:
-        """The path without the nodes to drop, but for those whose loss would put it at fault."""
+        """The path without the nodes to drop, but for those whose loss would put it at fault.
+
+        Parameters
+        ----------
+        path
+            With n nodes.
+        drop
+            The nodes (n,) to leave out, none of them pinned or an end of a rigid segment.
+        """
         before: Mask | None = None
         while drop.any():
             kept = np.flatnonzero(~drop)
@@ -172,6 +213,7 @@ class Guard:
             if not fault.any():
                 return thinner
             if (fault & merged).any():
+                # Counts up where a segment at fault begins and down where it ends: all nodes it skips come back.
                 restored = np.zeros(len(drop) + 1, dtype=int)
                 np.add.at(restored, kept[:-1][fault], 1)
                 np.add.at(restored, kept[1:][fault], -1)

@@ -1,6 +1,6 @@
 """Which segments of a path come near each other: searched for with points, measured with arrays.
 
-Making a line for every segment and a tree over them takes longer than all else in a refinement; lines are made of
+Making a line for every segment and a tree over them takes longer than all else in a refinement. Lines are made of
 those few segments alone for which arithmetic with rounding leaves the answer open.
 """
 
@@ -17,11 +17,11 @@ from oxbow_path.refinement.polyline import Polyline
 __all__ = ["beyond", "least_gap_m", "may_meet", "nearer", "steps_between"]
 
 PIECE = 2.0
-"""Long segments are searched for in pieces, of so many mean segments at most."""
+"""Long segments are searched for in pieces no longer than this many mean segments."""
 
 
 def may_meet(path: Polyline, asked: Indices, reach_m: FloatArray, most_m: float) -> Indices:
-    """Pairs (2, m) of segments, one of them asked, that can come nearer than some distance; no neighbours.
+    """Pairs (2, m) of segments, one of them asked, that can come nearer than some distance; neighbours left out.
 
     Parameters
     ----------
@@ -30,10 +30,11 @@ def may_meet(path: Polyline, asked: Indices, reach_m: FloatArray, most_m: float)
     asked
         The numbers of those that are asked for.
     reach_m
-        How far each segment may move, and what is near, in halves: shape (n - 1,).
+        How far each segment may move, plus half the distance that counts as near; shape (n - 1,).
     most_m
-        Longer pieces of a segment are searched for apart.
+        The longest piece of a segment that is searched for as one.
     """
+    # A search over circles finds pairs as far apart as the widest: one long segment would pair with half the path.
     longest_m = min(most_m, PIECE * float(path.lengths_m.mean()))
     pieces = np.maximum(1, np.ceil(path.lengths_m / max(longest_m, ROUNDING_M))).astype(int)
     owner = np.repeat(np.arange(len(pieces)), pieces)
@@ -74,8 +75,23 @@ def _within(points: FloatArray, radius_m: FloatArray, asked: Mask) -> Indices:
 def nearer(path: Polyline, pairs: Indices, clearance_m: float, touching_m: float) -> tuple[Indices, Mask]:
     """The pairs (2, m) of segments that are no farther apart than the clearance, and which of them touch.
 
-    Two touch that are no farther apart than `touching_m`.
+    Parameters
+    ----------
+    path
+        Where the segments are.
+    pairs
+        Numbers of segments, shape (2, m).
+    clearance_m
+        The distance up to which two segments count as near.
+    touching_m
+        The distance up to which they touch.
+
+    Returns
+    -------
+    tuple of ndarray
+        The near pairs, shape (2, k), and whether those of each touch, shape (k,).
     """
+    # From cheap to exact: circles about the middles, then arithmetic with room for rounding, then GEOS.
     middle = (path.nodes[1:] + path.nodes[:-1]) / 2
     reach_m = path.lengths_m[pairs].sum(axis=0) / 2 + clearance_m + ROUNDING_M
     pairs = pairs[:, np.hypot(*(middle[pairs[0]] - middle[pairs[1]]).T) <= reach_m]
@@ -86,19 +102,50 @@ def nearer(path: Polyline, pairs: Indices, clearance_m: float, touching_m: float
 
 
 def least_gap_m(path: Polyline, pairs: Indices) -> float:
-    """The least distance between the two segments of any pair (2, m); infinite without pairs."""
+    """The least distance between the two segments of any pair; infinite without pairs.
+
+    Parameters
+    ----------
+    path
+        Where the segments are.
+    pairs
+        Numbers of segments, shape (2, m).
+    """
     return float(_gaps_m(path.nodes, pairs).min(initial=np.inf))
 
 
 def steps_between(path: Polyline, pairs: Indices) -> Indices:
-    """How many segments on along the path the second of each pair (2, m) is."""
+    """How many segments the two of each pair are apart along the path, the shorter way round a closed one.
+
+    Parameters
+    ----------
+    path
+        Where the segments are.
+    pairs
+        Numbers of segments, shape (2, m).
+
+    Returns
+    -------
+    ndarray of int, shape (m,)
+        1 for neighbours.
+    """
     count = len(path.legs)
     steps = np.abs(pairs[1] - pairs[0])
     return np.asarray(np.minimum(steps, count - steps) if path.is_closed else steps)
 
 
 def beyond(path: Polyline, pairs: Indices, steps: int) -> Indices:
-    """The pairs that are more than so many segments apart along the path."""
+    """The pairs that are more than `steps` segments apart along the path.
+
+    Parameters
+    ----------
+    path
+        Where the segments are.
+    pairs
+        Numbers of segments, shape (2, m).
+    steps
+        1 leaves out neighbours.
+    """
     return np.asarray(pairs[:, steps_between(path, pairs) > steps])
 
 

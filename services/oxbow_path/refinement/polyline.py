@@ -38,7 +38,17 @@ class Polyline:
 
     @classmethod
     def of(cls, path: LineString, free: BaseGeometry, rigid: Mask | None = None) -> Polyline:
-        """A path's own vertices as nodes; `free` is the (prepared) free space."""
+        """A path's own vertices as nodes.
+
+        Parameters
+        ----------
+        path
+            With n vertices.
+        free
+            The free space with room for rounding, prepared: segments that it does not cover are legs.
+        rigid
+            Which segments (n - 1,) stay one straight line; by default none.
+        """
         nodes = shapely.get_coordinates(path)
         segments = shapely.linestrings(np.stack([nodes[:-1], nodes[1:]], axis=1))
         legs = ~np.asarray(shapely.covers(free, segments))
@@ -60,7 +70,7 @@ class Polyline:
 
     @property
     def length_m(self) -> float:
-        """The length of all."""
+        """The length of the whole path."""
         return float(self.lengths_m.sum())
 
     @property
@@ -79,7 +89,7 @@ class Polyline:
         return self._cut(pieces)
 
     def subdivided(self, pieces: int) -> Polyline:
-        """With every segment cut into so many equal ones."""
+        """With every segment cut into `pieces` equal ones."""
         return self._cut(np.full(len(self.legs), pieces))
 
     def _cut(self, pieces: Indices) -> Polyline:
@@ -107,5 +117,6 @@ class Polyline:
         crowded = np.zeros(len(self.nodes), dtype=bool)
         both = self.lengths_m[:-1] + self.lengths_m[1:] < least_m
         crowded[1:-1] = both & ~self.pinned[1:-1] & ~self.rigid[:-1] & ~self.rigid[1:]
+        # Of a run of crowded nodes every second one may go, the first included.
         run = np.arange(len(crowded)) - np.maximum.accumulate(np.where(crowded, 0, np.arange(len(crowded))))
         return np.asarray(crowded & (run % 2 == 1))

@@ -55,7 +55,21 @@ class Feet:
 def feet(path: Polyline, points: FloatArray, spacing_m: float) -> Feet:
     """The nearest place of the path to each point.
 
-    The nearest of many points along the path tells the segment, or one of its two neighbours does.
+    The segment is that of the nearest of many points along the path, or one of its two neighbours.
+
+    Parameters
+    ----------
+    path
+        Where the feet are.
+    points
+        Shape (m, 2), in metres.
+    spacing_m
+        The nominal spacing, which scales the distance of the points along the path.
+
+    Returns
+    -------
+    Feet
+        One per point.
     """
     pieces = np.maximum(1, np.ceil(path.lengths_m / (STEP * spacing_m)).astype(int))
     owner = np.repeat(np.arange(len(pieces)), pieces)
@@ -105,7 +119,23 @@ class Pull:
     def of(
         cls, path: Polyline, samples: Samples, at: Feet, pull: FloatArray, step: float, spacing_m: float
     ) -> Pull:
-        """Set up the equations; the feet are pulled a share `step` of the way."""
+        """Set up the equations.
+
+        Parameters
+        ----------
+        path
+            With n nodes.
+        samples
+            The m places that pull.
+        at
+            The foot of each on the path.
+        pull
+            How strongly each pulls, shape (m,).
+        step
+            The share of the way to its sample that a foot is pulled.
+        spacing_m
+            The nominal spacing, which bounds the pull of short segments.
+        """
         count = len(path.nodes)
         on = at.on(path.nodes)
         goal = on + step * (samples.points - on)
@@ -119,6 +149,7 @@ class Pull:
         diagonal = gathered(first * (1.0 - at.share), second * at.share)
         right = np.column_stack([gathered(first * axis, second * axis) for axis in goal.T])
         beside = gathered(first * at.share, np.zeros_like(second))[:-1]
+        # The median, since a few far samples lead the mean, which would hold all other nodes fast.
         hold = INERTIA * float(np.median(diagonal[diagonal > 0])) + EXACTNESS * diagonal
         return cls(
             path,
@@ -135,6 +166,7 @@ class Pull:
         diagonal[:-1] += taut
         diagonal[1:] += taut
         beside, right, pinned = self.beside - taut, self.right.copy(), self.path.pinned
+        # What pinned nodes contribute moves to the right-hand side, so that the matrix stays symmetric.
         held = np.where(pinned[:, None], self.path.nodes, 0.0)
         right[:-1] -= beside[:, None] * held[1:]
         right[1:] -= beside[:, None] * held[:-1]
@@ -144,13 +176,24 @@ class Pull:
         return np.asarray(solveh_banded(banded, right, check_finite=False))
 
     def fitted(self, length_m: float, tension: float | None, spacing_m: float) -> Solution:
-        """The solution whose length is about, but not above, `length_m`; `tension` is that of the step before."""
+        """The solution about as long as `length_m`, and no longer where the tensions tried suffice for that.
+
+        Parameters
+        ----------
+        length_m
+            How long the path is to become.
+        tension
+            That of the step before, near which this one's is looked for; None in the first step.
+        spacing_m
+            The nominal spacing, which scales the tensions that the first step tries.
+        """
         if tension is None:
             unit = float(np.median(self.diagonal)) * spacing_m
             low, high = (factor * unit for factor in TENSION_RANGE)
         else:
             low, high = tension / TENSION_CHANGE, tension * TENSION_CHANGE
         for _ in range(HALVINGS):
+            # The geometric middle: the range spans orders of magnitude.
             middle = math.sqrt(low * high)
             if np.hypot(*np.diff(self.solved(middle), axis=0).T).sum() > length_m:
                 low = middle

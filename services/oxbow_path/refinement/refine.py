@@ -24,10 +24,10 @@ STEPS = (15, 60)
 """Fewest and most steps."""
 
 WORK = 7_000_000
-"""Steps times samples, and nodes: about so many seconds' worth of a millionth each."""
+"""Steps times samples, and nodes as `NODE_WORK` counts them: about a microsecond each."""
 
 NODE_WORK = 15
-"""A node takes as long as so many samples."""
+"""A node takes as long as this many samples."""
 
 POWERS = (4.0, 16.0)
 """The power of the distance whose sum is minimised: first the mean counts, at last the largest."""
@@ -42,7 +42,7 @@ FARTHEST_STEP = 0.25
 """No node moves farther in one step, in spacings."""
 
 FARTHEST_PULL = 2.5
-"""Samples farther from the path than so many radii pull no harder."""
+"""Samples farther from the path than this many radii pull no harder."""
 
 AIM = 0.998
 """Share of the longest length that the steps aim at; the guard may keep a path from shortening as far."""
@@ -55,7 +55,10 @@ EVENNESS_QUANTILE = 0.95
 
 @dataclass(frozen=True)
 class RefinementStep:
-    """Where the refinement stood: largest distance and 95th percentile at the samples, in metres; length."""
+    """Where the refinement stands: the path, its length, and how far the samples are from it.
+
+    `largest_m` is the largest distance of a sample, `p95_m` the 95th percentile, both times the samples' weights.
+    """
 
     path: LineString
     length_m: float
@@ -64,7 +67,7 @@ class RefinementStep:
 
     @property
     def score_m(self) -> float:
-        """What is to become small."""
+        """What the refinement makes small."""
         return self.largest_m + self.p95_m
 
 
@@ -100,12 +103,12 @@ def refined(
     spacing_m
         The nominal spacing, area / length.
     enough_m
-        A path so near to all samples, and no longer than allowed, is not refined further.
+        A path this near to all samples, and no longer than allowed, is not refined further.
     stop
         Asked before each step whether time is up; a path still too long goes on. Without a limit the number of
         steps is fixed by the samples.
     watch
-        Told of every step.
+        Called with the number and the state of every step.
 
     Returns
     -------

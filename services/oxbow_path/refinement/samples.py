@@ -38,14 +38,24 @@ class Samples:
 
     @classmethod
     def over(cls, free: Polygon, pitch_m: float, areas: Sequence[WeightedArea] = ()) -> Samples:
-        """Cover `free` by places about `pitch_m` apart."""
+        """Cover `free` by places about `pitch_m` apart.
+
+        Parameters
+        ----------
+        free
+            The free space.
+        pitch_m
+            Distance of neighbouring places of the lattice.
+        areas
+            Where sampling is to be denser, or less dense.
+        """
         shore = shapely.get_coordinates(shapely.segmentize(free.boundary, SHORE_PITCH * pitch_m))
         points = np.vstack([_lattice(free, pitch_m), shore])
         return cls(points, weights_at(points, areas))
 
     @cached_property
     def area_weights(self) -> FloatArray:
-        """What a place counts where not distances but places are weighed."""
+        """The weight of each place where places are weighed, not distances."""
         return np.asarray(self.weights**2)
 
     def __len__(self) -> int:
@@ -66,7 +76,20 @@ def _lattice(free: Polygon, pitch_m: float) -> FloatArray:
 
 
 def weights_at(points: FloatArray, areas: Sequence[WeightedArea]) -> FloatArray:
-    """The weight of each place (n, 2): that of the area that holds it, 1 outside all; scaled to a mean of 1."""
+    """The weight of each place: that of the area that holds it, 1 outside all; scaled to a mean of 1.
+
+    Parameters
+    ----------
+    points
+        Shape (n, 2), in metres.
+    areas
+        In the same frame; they do not overlap.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        All 1 where the areas leave no weight at all.
+    """
     weights = np.ones(len(points))
     if areas:
         place, area = STRtree([entry.area for entry in areas]).query(shapely.points(points), predicate="within")

@@ -37,8 +37,9 @@ def smoothed(path: Polyline, free: Polygon, spacing_m: float) -> LineString:
     free
         The free space.
     spacing_m
-        The nominal spacing: what is near, and what is small.
+        The nominal spacing, which scales the roundings and the detail that is left out.
     """
+    # Rigid segments get control points as all others do, so that the corners at their ends are rounded too.
     loose = Polyline(path.nodes, path.pinned, path.legs, np.zeros_like(path.rigid))
     control = loose.divided(CONTROL_PITCH * spacing_m)
     fine = control.subdivided(PIECES)
@@ -48,7 +49,8 @@ def smoothed(path: Polyline, free: Polygon, spacing_m: float) -> LineString:
 
 
 def _spline(control: FloatArray, pieces: int) -> FloatArray:
-    """Points of a uniform cubic B-spline, `pieces` a span, from the first control point to the last."""
+    """Points of a uniform cubic B-spline, `pieces` per span, from the first control point to the last."""
+    # Control points reflected in the ends make the curve begin and end there.
     ends = np.vstack([2 * control[0] - control[1], control, 2 * control[-1] - control[-2]])
     t = (np.arange(pieces) / pieces)[:, None]
     weights = np.hstack([(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3]) / 6.0

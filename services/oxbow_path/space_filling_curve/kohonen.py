@@ -69,8 +69,8 @@ def organised(
     Each epoch gives every draw to its nearest node, and moves every node to the mean of its neighbourhood's draws,
     weighted by a Gaussian along the ring: the batch form of Kohonen's rule (Kohonen 2001, section 3.6), where the
     report draws one input after another. The number of nodes follows the length, by dividing long segments and
-    dropping crowded nodes, where the report samples the whole path anew. What the report leaves open, the guard
-    holds: no update leaves the free space or makes the ring meet itself.
+    dropping crowded nodes, where the report samples the whole path anew. The guard ensures what the report leaves
+    open: no update leaves the free space or makes the ring meet itself.
 
     Parameters
     ----------
@@ -88,6 +88,11 @@ def organised(
         Number of updates and width of the neighbourhood.
     stop
         Asked before each epoch whether time is up.
+
+    Yields
+    ------
+    Epoch
+        The ring after each update.
     """
     first_count = NODES_PER_SPACING * length_m / spacing_m
     least, most = (factor * first_count for factor in NODES_RANGE)

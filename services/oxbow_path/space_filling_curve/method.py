@@ -24,7 +24,7 @@ which folds it into the water without a preferred direction.
 """
 
 LEAST_START = 0.35
-"""Share of the longest length below which the ring would have to find its way by itself: it gets spurs first."""
+"""A first walk shorter than this share of the longest length gets spurs: it leaves the ring too much to find."""
 
 EPOCHS = (8, 30)
 """Fewest and most updates of the ring."""
@@ -33,7 +33,7 @@ WORK = 3_000_000
 """Updates times draws, and nodes: very long paths get fewer updates."""
 
 REACH_NAMED = 2.0
-"""Water farther from the path than so many half spacings is named as dropped."""
+"""Water farther from the path than this many half spacings is named as dropped."""
 
 
 def space_filling_curve(task: Task, display: Display) -> MethodPlan:
@@ -42,7 +42,14 @@ def space_filling_curve(task: Task, display: Display) -> MethodPlan:
     The steps are those of the report: a circuit over the cells, low-discrepancy sequences in each, a ring
     that is updated with them until it has spread, a number of nodes that follows the length. Two things are added:
     every update is guarded, so that the path stays simple and inside through islands, straits and narrow arms,
-    and the refinement ends it, since the ring knows nothing of its worst gap, nor quite how long it is.
+    and the refinement ends it, since the ring ignores its worst gap, and keeps only roughly to the length.
+
+    Parameters
+    ----------
+    task
+        The request made ready.
+    display
+        Shows how the path came about.
 
     Raises
     ------
@@ -61,6 +68,7 @@ def space_filling_curve(task: Task, display: Display) -> MethodPlan:
         if number % SHOWN_EVERY == 0:
             display.lines("ring", [ring.line], step=number, labels=(f"epoch {number}",))
     path = improved(ring, task, display)
+    # A ring that grew too long may not shorten enough under the guard; the walk it began from fits.
     if not task.budget.fits(path.length):
         path = improved(Polyline.of(start.path, task.waters.passable.free_and_rounding), task, display)
     steps.append(SpacingStep(spacing_m=task.spacing_m, length_m=path.length))

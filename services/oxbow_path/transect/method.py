@@ -20,7 +20,7 @@ from oxbow_path.walk.trial import Trial
 __all__ = ["transects"]
 
 UPRIGHT = 0.02
-"""Slope at most, of what counts as a transect."""
+"""Largest slope, against the sweep line, of what counts as a transect."""
 
 FIRST_SPACING = 1.15
 """The first spacing tried, as a multiple of area / length: turns and ways back cost about as much."""
@@ -28,6 +28,13 @@ FIRST_SPACING = 1.15
 
 def transects(task: Task, display: Display) -> MethodPlan:
     """Plan a path of parallel transects, and refine it: transects slide and turn a little, all else moves freely.
+
+    Parameters
+    ----------
+    task
+        The request made ready.
+    display
+        Shows how the path came about.
 
     Raises
     ------

@@ -9,7 +9,15 @@ __all__ = ["show_transects"]
 
 
 def show_transects(fit: Fit, display: Display) -> None:
-    """Show every trial in the order of trying, and what the chosen one is made of."""
+    """Show every trial in the order of trying, and what the chosen one is made of.
+
+    Parameters
+    ----------
+    fit
+        The chosen trial, and all trials.
+    display
+        Receives the layers `iterations`, `loop`, `transects`, `circuit` and `cuts`.
+    """
     for step, trial in enumerate(fit.trials):
         label = f"spacing {trial.pattern.spacing_m:.1f} m"
         display.lines("iterations", [trial.path], step=step, labels=(label,))

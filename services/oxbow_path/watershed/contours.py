@@ -20,7 +20,7 @@ DETAIL = 0.05
 """How far a contour may be moved to straighten it, in spacings."""
 
 LEAST_AREA = 1.0
-"""Parts of a level smaller than this many squared spacings are left to branches."""
+"""Parts of a level smaller than this many squared spacings of the path's legs are left to branches."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def contour_tree(free: Polygon, routes: Routes, *, first_m: float, spacing_m: fl
     free
         The free space.
     routes
-        Ways through it, where its levels hang together only by water too narrow for a contour.
+        Ways through it, where only water too narrow for a contour connects its levels.
     first_m
         Depth of the outermost contours.
     spacing_m
@@ -80,7 +80,7 @@ def _all_parts(parts: Sequence[_Part]) -> Iterator[_Part]:
 
 
 def _closed(ring: LinearRing) -> LineString:
-    """The ring as a line that ends one segment after its start: so it has no ends that show."""
+    """The ring as a line that runs one segment past its start, so that flat ends leave no notch in its band."""
     points = shapely.get_coordinates(ring)
     return LineString(np.vstack([points, points[1]]))
 

@@ -29,6 +29,13 @@ FIRST_SPACING = 1.15
 def watershed(task: Task, display: Display) -> MethodPlan:
     """Plan a path along contours of the distance to the shore, and refine it.
 
+    Parameters
+    ----------
+    task
+        The request made ready.
+    display
+        Shows how the path came about.
+
     Raises
     ------
     Infeasible
@@ -46,6 +53,13 @@ def watershed(task: Task, display: Display) -> MethodPlan:
 def plan_watershed(waters: Waters, budget: Budget) -> Fit:
     """The walk round contours, at the spacing that uses the length best.
 
+    Parameters
+    ----------
+    waters
+        The water, and how launch and recovery points are reached.
+    budget
+        The longest path, and the least spacing.
+
     Raises
     ------
     Infeasible
@@ -60,6 +74,13 @@ def try_contours(waters: Waters, pattern: Pattern) -> Trial:
     """Build the path for one pattern.
 
     Contours stand two spacings apart, so that the legs on their two sides stand one spacing apart.
+
+    Parameters
+    ----------
+    waters
+        The water, and how launch and recovery points are reached.
+    pattern
+        The spacing; its phase does not matter.
     """
     circuit = contour_tree(
         waters.free,
