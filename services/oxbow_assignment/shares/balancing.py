@@ -1,11 +1,11 @@
 """Balancing: triangles change hands along the borders of shares until every share has what is due to it.
 
-Balampanis, Maza and Ollero 2016, section VIII, propose to exchange border cells between vehicles. One by one,
-these make ragged borders and cut shares in two. Here a potential is spread over the giver's share, 0 beyond its
-border with the taker and 1 in its farthest triangle, harmonic between. By the maximum principle every triangle has
-a neighbour of lower and one of higher potential: what lies below any level hangs together with the taker, what
-lies above it with the farthest triangle. The level is chosen by area. Level lines of a harmonic function are short
-and run across narrows.
+Balampanis, Maza and Ollero 2016, section VIII, propose to exchange border cells between vehicles. Exchanged one by
+one, these make ragged borders and cut shares in two. This module instead spreads a potential over the giver's
+share: 0 beyond its border with the taker, 1 in its farthest triangle, and harmonic between. By the maximum
+principle every triangle has a neighbour of lower and one of higher potential, so that the part below any level is
+connected to the taker, and the part above it to the farthest triangle. The level is chosen by area. Level lines of
+a harmonic function are short and run across narrows.
 """
 
 from __future__ import annotations
@@ -26,22 +26,40 @@ __all__ = ["balanced_shares", "border_lengths_m", "imbalance"]
 
 
 TOLERANCE = 0.01
-"""Shares nearer than this to what is due are left as they are."""
+"""Shares that deviate from what is due by no more than this fraction are left as they are."""
 
 TRANSFERS = 6
-"""Transfers a share, at most."""
+"""At most this many transfers per share."""
 
 TRIES = 4
 """How many farthest triangles are tried in one transfer."""
 
 
 def imbalance(areas_m2: FloatArray, due_m2: FloatArray) -> float:
-    """The greatest deviation of a share from what is due to it, as a share of that."""
+    """The greatest relative deviation of a share from what is due to it.
+
+    Parameters
+    ----------
+    areas_m2
+        The area of every share, shape (k,).
+    due_m2
+        The area due to every share, > 0, shape (k,).
+    """
     return float(np.abs(areas_m2 / due_m2 - 1.0).max())
 
 
 def border_lengths_m(mesh: Mesh, share: Indices, count: int) -> FloatArray:
-    """Length of the border between every two shares, shape (count, count)."""
+    """Length of the border between every two shares, in metres, shape (count, count); symmetric.
+
+    Parameters
+    ----------
+    mesh
+        The mesh.
+    share
+        The share of every triangle, 0 to `count` - 1, shape (m,).
+    count
+        The number of shares.
+    """
     triangle, side = np.nonzero((mesh.neighbours >= 0) & (share[mesh.neighbours] != share[:, None]))
     lengths = np.zeros((count, count))
     pair = (share[triangle], share[mesh.neighbours[triangle, side]])
@@ -57,22 +75,24 @@ def balanced_shares(mesh: Mesh, share: Indices, due_m2: FloatArray, allowed: Mas
     mesh
         The mesh.
     share
-        To whom every triangle belongs, shape (m,); every share is connected.
+        The share of every triangle, shape (m,); every share is connected.
     due_m2
-        The area that is due to each share; in all, the area of the mesh.
+        The area due to each share, shape (k,); they sum to the area of the mesh.
     allowed : ndarray of bool, shape (k, m)
         Which triangles each share may take.
 
     Returns
     -------
     ndarray of int, shape (m,)
-        Shares, within `TOLERANCE` of what is due where the triangles allow it.
+        The share of every triangle; areas are within `TOLERANCE` of what is due where the triangles allow it.
     """
     count = len(due_m2)
     least, since = np.inf, 0
     for _ in range(TRANSFERS * count):
         areas = np.bincount(share, mesh.areas_m2, minlength=count).astype(float)
         uneven = imbalance(areas, due_m2)
+        # A transfer down the tree may worsen the balance before the next one mends it: as many rounds as there are
+        # shares may pass without progress.
         least, since = (uneven, 0) if uneven < least else (least, since + 1)
         if uneven <= TOLERANCE or since > count:
             break
@@ -90,9 +110,10 @@ def balanced_shares(mesh: Mesh, share: Indices, due_m2: FloatArray, allowed: Mas
 def _transfers(
     mesh: Mesh, share: Indices, surplus_m2: FloatArray, least_m2: float
 ) -> list[tuple[int, int, float]]:
-    """Giver, taker and area of what may be transferred next, the most first: nobody gives before it has got.
+    """Giver, taker and area of the transfers that may be made next, the largest first.
 
-    What flows over a tree of neighbours, joined where their borders are longest, is determined.
+    Over a tree of neighbours the flows are determined; the tree joins shares where their borders are longest. A
+    share gives only once it has received all that it is to receive.
     """
     lengths = border_lengths_m(mesh, share, len(surplus_m2))
     neighbours: nx.Graph[int] = nx.from_numpy_array(lengths)
@@ -111,7 +132,7 @@ def _transfers(
 
 @dataclass(frozen=True)
 class _Giver:
-    """A share that gives to a neighbour; its triangles are numbered anew, 0 to n - 1.
+    """A share that gives to a neighbour; its triangles are renumbered from 0 to n - 1.
 
     Parameters
     ----------
@@ -147,7 +168,10 @@ class _Giver:
         return cls(mesh, triangles, inner.tocsr(), outlets, allowed[giver, triangles], ~allowed[taker, triangles])
 
     def part(self, area_m2: float, tolerance_m2: float) -> Mask:
-        """The part of about this area to give, shape (m,); it hangs together with the taker, and the rest does."""
+        """The part of about this area to give, shape (m,); it is connected to the taker, and the rest to itself.
+
+        Nothing is given where no part comes nearer to the area than none.
+        """
         ways = self.mesh.graph[self.triangles][:, self.triangles]
         from_taker_m = dijkstra(ways, indices=np.flatnonzero(self.outlets), min_only=True)
         from_taker_m = np.where(self.owned, from_taker_m, -1.0)
@@ -161,15 +185,18 @@ class _Giver:
                     best, least_error = given, error
             if least_error <= tolerance_m2:
                 break
-            # A dead end changes hands as a whole: the potential is to vary in it.
+            # The potential is constant in a dead end, which thus changes hands as a whole. It varies in one that
+            # holds the farthest triangle.
             farthest = int(np.argmax(np.where(above & ~below, from_taker_m, -2.0)))
         moved = np.zeros(len(self.mesh), dtype=bool)
         moved[self.triangles[best]] = True
         return moved
 
     def _bracket(self, farthest: int, area_m2: float) -> tuple[Mask, Mask]:
-        """The parts below two consecutive levels, one no more than the area, the other more."""
+        """The parts below two consecutive levels: one of no more than the area, the other of more."""
         order = np.argsort(self._potential(farthest), kind="stable")
+        # Stable, since ties are common, and the order decides which triangles change hands. The farthest one never
+        # does: it comes last.
         low, high = 0, len(order) - 1
         below, above = self._severed(order[:low], farthest), self._severed(order[:high], farthest)
         while high - low > 1:
@@ -182,7 +209,7 @@ class _Giver:
         return below, above
 
     def _area_m2(self, given: Mask) -> float:
-        """The area of what is given; infinite where the taker must not have it."""
+        """The area of what is given; infinite if the taker must not have some of it."""
         return math.inf if (given & self.barred).any() else float(self.mesh.areas_m2[self.triangles[given]].sum())
 
     def _potential(self, farthest: int) -> FloatArray:
@@ -197,7 +224,7 @@ class _Giver:
         return potential
 
     def _severed(self, part: Indices, farthest: int) -> Mask:
-        """The given part, but for what would not hang together with the taker, and with what it cuts off."""
+        """The part, less what would not be connected to the taker, plus what it cuts off from `farthest`."""
         given = np.zeros(len(self.triangles), dtype=bool)
         given[part] = True
         given &= np.isin(pieces := self._pieces(given), pieces[given & (self.outlets > 0)])

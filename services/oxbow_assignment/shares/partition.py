@@ -27,12 +27,13 @@ __all__ = [
 ]
 
 BALANCE = 0.05
-"""How far the area of a share may be from what is due to it, as a share of that."""
+"""The greatest relative deviation of a share's area from what is due to it that counts as balanced."""
 
 ROUNDS = 6
-"""How often seeds move to the middle of their shares."""
+"""Seeds move to the middles of their shares at most this many times."""
 
 SUBDIVISIONS = 4
+"""Every triangle is divided in four at most this many times."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,17 @@ class Partition:
 
     @classmethod
     def of(cls, mesh: Mesh, share: Indices, capacities: FloatArray) -> Partition:
-        """A partition whose waves start from the middles of its shares."""
+        """A partition whose waves start from the middles of its shares.
+
+        Parameters
+        ----------
+        mesh
+            The mesh.
+        share
+            The vehicle of every triangle, 0 to k - 1, shape (m,); no share is empty.
+        capacities
+            What every vehicle can cover, in any unit, shape (k,).
+        """
         seeds = _middles(mesh, share, len(capacities))
         return cls(mesh, share, _depth(mesh, share, seeds), tuple(seeds.tolist()), capacities)
 
@@ -77,7 +88,7 @@ class Partition:
 
     @property
     def imbalance(self) -> float:
-        """The greatest deviation of a share's area from what is due, as a share of that."""
+        """The greatest relative deviation of a share's area from what is due."""
         return imbalance(self.areas_m2, self.due_m2)
 
     @cached_property
@@ -92,15 +103,24 @@ class Partition:
 
     @property
     def border_m(self) -> float:
-        """Length of all borders between shares: the less, the more compact are the shares."""
+        """Length of all borders between shares: the shorter it is, the more compact the shares."""
         return float(self.borders_m.sum() / 2)
 
 
 def wavefront_partition(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None = None) -> Partition:
     """Share a mesh by antagonising wavefronts (Balampanis, Maza and Ollero 2016, Algorithm 1).
 
-    Waves of one speed run from the vehicles' starts; what capacities ask for is not looked at. Where vehicles
-    start from one triangle, all but the first are sent elsewhere before, as far from the others as possible.
+    Waves of equal speed run from the vehicles' starts; capacities do not steer them. Where several vehicles start
+    in one triangle, all but one are first moved elsewhere, as far from the others as possible.
+
+    Parameters
+    ----------
+    mesh
+        The mesh of the area.
+    starts
+        Where each vehicle starts from, in planar metres.
+    capacities
+        What each vehicle can cover, shape (k,); all equal by default. The partition's `due_m2` follows from it.
 
     Raises
     ------
@@ -116,23 +136,23 @@ def wavefront_partition(mesh: Mesh, starts: Sequence[Place], capacities: FloatAr
 def balanced_partition(
     mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None = None, allowed: Mask | None = None
 ) -> Partition:
-    """Share a mesh in proportion to capacities, every share connected: within `BALANCE`, or as nearly as can be.
+    """Share a mesh in proportion to capacities, every share connected: within `BALANCE`, or as nearly as possible.
 
-    The wavefronts' shares are balanced (`oxbow_assignment.shares.balancing`), their seeds move to their middles,
-    and so on; of all rounds, the shares with the shortest borders are taken. Where triangles are too large for
-    balance, or dead ends only one triangle wide, the mesh is divided further.
+    The wavefronts' shares are balanced (`oxbow_assignment.shares.balancing`), their seeds move to the middles, and
+    the waves run again; of all rounds, the shares with the shortest borders are taken. Where triangles are too
+    large for balance, or dead ends are only one triangle wide, the mesh is divided further.
 
     Parameters
     ----------
     mesh
         The mesh of the area.
     starts
-        Where each vehicle starts from, in planar metres; equal starts are spread.
+        Where each vehicle starts from, in planar metres; equal starts are moved apart.
     capacities
-        What each vehicle can cover; all equal where absent.
+        What each vehicle can cover, shape (k,); all equal by default.
     allowed : ndarray of bool, shape (k, m)
-        Which triangles each vehicle may have, at least one each; all where absent. A triangle that none of its
-        neighbours' vehicles may have stays where it is all the same.
+        Which triangles each vehicle may have, at least one each; all by default. A triangle that none of its
+        neighbours' vehicles may have stays with its vehicle even so.
 
     Raises
     ------
@@ -143,6 +163,7 @@ def balanced_partition(
     allowed = _everywhere(mesh, starts) if allowed is None else allowed
     seeds = _spread(mesh, starts, capacities, allowed)
     share = min(_rounds(mesh, seeds, capacities, allowed), key=partial(_badness, mesh, capacities=capacities))
+    # Where reach bounds the shares, it is the reach and not coarse triangles that keeps them from balance.
     for _ in range(SUBDIVISIONS if allowed.all() else 0):
         if _imbalance(mesh, share, capacities) <= BALANCE:
             break
@@ -152,7 +173,17 @@ def balanced_partition(
 
 
 def rebalanced(partition: Partition, capacities: FloatArray, allowed: Mask) -> Partition:
-    """A partition with its borders moved as other capacities ask for; see `balanced_partition`."""
+    """A partition whose borders are moved to suit other capacities; see `balanced_partition`.
+
+    Parameters
+    ----------
+    partition
+        Where the borders start from.
+    capacities
+        What each vehicle can cover, > 0, in any unit, shape (k,).
+    allowed
+        Which triangles each vehicle may have, shape (k, m).
+    """
     share = _balanced(partition.mesh, partition.share, capacities, allowed)
     return Partition.of(partition.mesh, share, capacities)
 
@@ -174,9 +205,18 @@ def _everywhere(mesh: Mesh, starts: Sequence[Place]) -> Mask:
 
 
 def due_areas_m2(mesh: Mesh, share: Indices, capacities: FloatArray) -> FloatArray:
-    """The area due to every share in proportion to capacities, shape (k,).
+    """The area due to every share in proportion to capacities, in m2, shape (k,).
 
-    Pieces of the mesh that do not hang together are each shared by those who are there.
+    Each connected piece of the mesh is shared among the vehicles that have a share in it.
+
+    Parameters
+    ----------
+    mesh
+        The mesh.
+    share
+        The vehicle of every triangle, 0 to k - 1, shape (m,); every share lies in one piece of the mesh.
+    capacities
+        What each vehicle can cover, in any unit, shape (k,).
     """
     piece = mesh.pieces[np.unique(share, return_index=True)[1]]
     areas_m2 = np.bincount(mesh.pieces, mesh.areas_m2)
@@ -196,7 +236,7 @@ def _rounds(mesh: Mesh, seeds: Indices, capacities: FloatArray, allowed: Mask) -
 
 
 def _matched(mesh: Mesh, share: Indices, allowed: Mask) -> Indices:
-    """The same shares, each with the vehicle that suits it: such that the least of them is out of reach."""
+    """The same shares, matched to vehicles so that the least area is out of reach of its vehicle."""
     if allowed.all():
         return share
     barred_m2 = (~allowed * mesh.areas_m2) @ (share[:, None] == np.arange(len(allowed)))
@@ -205,14 +245,15 @@ def _matched(mesh: Mesh, share: Indices, allowed: Mask) -> Indices:
 
 
 def _balanced(mesh: Mesh, share: Indices, capacities: FloatArray, allowed: Mask) -> Indices:
-    """Shares of allowed triangles, as far as that can be, balanced."""
+    """Balanced shares of allowed triangles, as far as possible."""
+    # Once before, since only allowed triangles change hands, and once after, since a transfer may cut some off.
     share = _within_reach(mesh, share, allowed)
     share = balanced_shares(mesh, share, due_areas_m2(mesh, share, capacities), allowed)
     return _within_reach(mesh, share, allowed)
 
 
 def _with_all(share: Indices, allowed: Mask) -> Indices:
-    """Shares of which none is empty: who has nothing within reach gets a triangle of the largest share there."""
+    """Shares of which none is empty: a vehicle with nothing in reach takes a triangle of the largest share."""
     share = share.copy()
     for vehicle in np.flatnonzero(~(allowed & (share == np.arange(len(allowed))[:, None])).any(axis=1)):
         sizes = np.bincount(share, minlength=len(allowed))
@@ -222,9 +263,9 @@ def _with_all(share: Indices, allowed: Mask) -> Indices:
 
 
 def _within_reach(mesh: Mesh, share: Indices, allowed: Mask) -> Indices:
-    """Shares without what is not allowed, and what that cuts off; neighbours have it, where they may.
+    """Shares without triangles that are not allowed or are cut off by them; neighbours take these where they may.
 
-    Every share keeps its largest connected part of allowed triangles, one at least.
+    Every share keeps its largest connected part of allowed triangles, at least one.
     """
     if allowed.all():
         return share
@@ -245,7 +286,20 @@ def _within_reach(mesh: Mesh, share: Indices, allowed: Mask) -> Indices:
 
 
 def largest_piece(mesh: Mesh, which: Mask) -> Mask:
-    """Of some triangles, those of the connected piece with the greatest area."""
+    """The connected piece of greatest area among some triangles.
+
+    Parameters
+    ----------
+    mesh
+        The mesh.
+    which
+        The triangles to look at, shape (m,); at least one.
+
+    Returns
+    -------
+    ndarray of bool, shape (m,)
+        Which triangles belong to that piece.
+    """
     pieces = mesh.part(which).pieces
     largest = np.zeros(len(mesh), dtype=bool)
     largest[which] = pieces == np.argmax(np.bincount(pieces, mesh.areas_m2[which], minlength=1))
@@ -258,7 +312,7 @@ def _imbalance(mesh: Mesh, share: Indices, capacities: FloatArray) -> float:
 
 
 def _badness(mesh: Mesh, share: Indices, *, capacities: FloatArray) -> tuple[float, float]:
-    """Balance first, where it is not good enough; then the length of all borders."""
+    """Balance first, as long as it is worse than `BALANCE`; then the length of all borders. Less is better."""
     borders_m = border_lengths_m(mesh, share, len(capacities))
     return max(_imbalance(mesh, share, capacities), BALANCE), float(borders_m.sum())
 
@@ -275,11 +329,11 @@ def _depth(mesh: Mesh, share: Indices, seeds: Indices) -> Indices:
 def _spread(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray, allowed: Mask) -> Indices:
     """A triangle for each vehicle: that of its start, or else the one farthest by water from those taken.
 
-    Of vehicles that start together, those of least reach and capacity are served first, so that the others have
-    what is far away.
+    Of vehicles that start together, those of least reach and capacity choose first, which leaves what is far away
+    to the others.
     """
     wanted = mesh.located(np.asarray(starts, dtype=float))
-    order = np.lexsort([capacities, allowed @ mesh.areas_m2])
+    order = np.lexsort([capacities, allowed @ mesh.areas_m2])  # by reach; the last key counts first
     seeds = np.full(len(wanted), -1)
     first = order[np.unique(wanted[order], return_index=True)[1]]
     first = first[allowed[first, wanted[first]]]
@@ -291,7 +345,7 @@ def _spread(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray, allowed
 
 
 def _distance_from(mesh: Mesh, triangles: Indices) -> FloatArray:
-    """Metres by water from the nearest of some triangles, shape (m,); the same everywhere where there are none."""
+    """Metres by water from the nearest of some triangles, shape (m,); 0 everywhere if there are none."""
     if not len(triangles):
         return np.zeros(len(mesh))
     return np.asarray(dijkstra(mesh.graph, indices=triangles, min_only=True))

@@ -18,10 +18,10 @@ from oxbow_assignment.shares.mesh import Mesh
 __all__ = ["Reach"]
 
 LEAST_LEFT = 1e-3
-"""Of a range, what counts as left for surveying at the least."""
+"""The least fraction of a range that counts as left for surveying, so that capacities stay positive."""
 
 SPARE = 0.01
-"""Share of a range that is kept back: legs run beside the shortest way."""
+"""Fraction of a range that is kept back, because legs do not run exactly along the shortest way."""
 
 
 @dataclass(frozen=True)
@@ -31,16 +31,16 @@ class Reach:
     Parameters
     ----------
     out_m, home_m : ndarray, shape (k, m)
-        From each vehicle's start to every triangle's centroid and from there to its recovery, with what of that is
-        outside the free space.
+        Metres from each vehicle's start to every triangle's centroid, and from there to its recovery; legs outside
+        the free space included.
     lengths_m : ndarray, shape (k,)
-        Each vehicle's range.
+        Each vehicle's range, in metres.
     legs_m : ndarray, shape (k,)
-        What of it the legs outside the free space take.
+        The part of it that the legs outside the free space take.
     docks : ndarray, shape (k, 2)
         Where each vehicle enters the free space.
     first, last : ndarray of int, shape (k,)
-        The triangles where each vehicle enters the free space, and where it leaves it; -1 if not of this mesh.
+        The triangles where each vehicle enters and leaves the free space; -1 if they are not in this mesh.
     """
 
     out_m: FloatArray
@@ -53,12 +53,23 @@ class Reach:
 
     @classmethod
     def of(cls, mesh: Mesh, vehicles: Sequence[Vehicle], free: Polygon, water: Polygon | None) -> Reach:
-        """The ways of vehicles through free space, and through water to it.
+        """The ways of vehicles through the free space, and through water to it.
+
+        Parameters
+        ----------
+        mesh
+            The mesh of the free space.
+        vehicles
+            At least one.
+        free
+            The free space.
+        water
+            What legs to and from the free space may cross; None for the free space alone.
 
         Raises
         ------
         Infeasible
-            A vehicle's range does not suffice to see any of the free space and go home; names the vehicle.
+            A vehicle's range is too short to survey any of the free space and go home; names the vehicle.
         """
         shore = leg_routes(free, free if water is None else water)
         ways = [
@@ -67,6 +78,7 @@ class Reach:
         ]
         legs_m = np.array([LineString(way).length for way in ways])
         docks = np.array([way[-1] for way in ways])
+        # Vehicles often share their launch and recovery points: each distinct dock is searched from once.
         places, row = np.unique(docks, axis=0, return_inverse=True)
         from_docks = lengths_from(free, places, mesh.centroids)[row] + legs_m[:, None]
         count = len(vehicles)
@@ -85,11 +97,11 @@ class Reach:
 
     @cached_property
     def allowed(self) -> Mask:
-        """Which triangles each vehicle can see and be home within its range, shape (k, m)."""
+        """Which triangles each vehicle can reach and still get home within its range, shape (k, m)."""
         return self.out_m + self.home_m <= (1.0 - SPARE) * self.lengths_m[:, None]
 
     def among(self, triangles: Mask) -> Reach:
-        """The ways to some of the triangles, which become a mesh of their own; the rest is nobody's."""
+        """The ways to some of the triangles, which become a mesh of their own; a mask of shape (m,)."""
         rank = np.cumsum(triangles) - 1
         nearest = [np.where(triangles[own], rank[own], -1) for own in (self.first, self.last)]
         return replace(
@@ -101,7 +113,10 @@ class Reach:
         )
 
     def on(self, mesh: Mesh) -> Reach:
-        """The ways to the triangles of this mesh as it is, or divided further (`Mesh.subdivided`)."""
+        """The ways to the triangles of this mesh as it is, or divided further (`Mesh.subdivided`).
+
+        The parts of a triangle have its ways; the first part stands for it as a dock.
+        """
         times = len(mesh) // self.out_m.shape[1]
         return replace(
             self,
@@ -112,10 +127,11 @@ class Reach:
         )
 
     def left_m(self, share: Indices) -> FloatArray:
-        """What its way leaves of each vehicle's range for its share, shape (k,).
+        """What its way leaves of each vehicle's range for its share, in metres, shape (k,).
 
-        Who starts in its share surveys at once, and who ends there is home; others go to the nearest place of the
-        share, by the shortest way there and home.
+        A vehicle that enters the free space in its share starts to survey at once, and one that leaves it there is
+        home. Others take the shortest way to their share and home. `share` is the vehicle of each triangle,
+        shape (m,).
         """
         left = [self._left_m(vehicle, share == vehicle) for vehicle in range(len(self.lengths_m))]
         return np.maximum(left, LEAST_LEFT * self.lengths_m)

@@ -1,8 +1,8 @@
 """Sharing the free space among the masters: each surveys a connected part, as large as its range asks for.
 
-What a vehicle can cover is what its way there and home leaves of its range. Ways depend on shares: so these are
-balanced by what the ways to them leave, again and again. Speed does not count: a vehicle uses its whole range,
-however fast. Water that no vehicle can see and be home within its range is nobody's.
+What a vehicle can cover is what its way there and home leaves of its range. Ways depend on shares, so shares are
+rebalanced repeatedly by what the ways to them leave. Speed does not count: a vehicle uses its whole range, however
+fast it is. Water that no vehicle can survey and still get home within its range belongs to no share.
 """
 
 from __future__ import annotations
@@ -33,19 +33,19 @@ from oxbow_assignment.shares.reach import Reach
 __all__ = ["Sharing", "shared"]
 
 TRIANGLES = 400
-"""Triangles of a share, about, where the footprint is not given."""
+"""Approximate number of triangles per share, where the footprint is not given."""
 
 MOST_TRIANGLES = 200_000
-"""More than these take minutes, and no share gets better by them."""
+"""A mesh of more triangles takes minutes and makes no share better."""
 
 ROUNDS = 8
-"""How often shares are balanced anew by what their ways leave, at most."""
+"""Shares are rebalanced by what their ways leave at most this many times."""
 
 SETTLED = 0.02
-"""Shares that are so near to what is due are not balanced anew."""
+"""Shares that deviate by less than this fraction of what is due are not rebalanced."""
 
 SPACING_POWER = 4
-"""The sum of this power of spacings, over all water, stands for the greatest spacing."""
+"""The integral of this power of the spacing over all water is a smooth stand-in for the greatest spacing."""
 
 TOO_FAR = "too far for the vehicles: none can go there and home within its length"
 BOXED_IN = "too far for the vehicles whose shares border on it; others would have to cross these"
@@ -53,20 +53,20 @@ BOXED_IN = "too far for the vehicles whose shares border on it; others would hav
 
 @dataclass(frozen=True)
 class Sharing:
-    """The free space in shares.
+    """The free space, divided into shares.
 
     Parameters
     ----------
     areas
-        One connected polygon a master, in their order; together with what is dropped the free space.
+        One connected polygon per master, in their order; with `dropped` they make up the free space.
     imbalance
-        The greatest deviation of a share's area from what is due to it, as a share of that.
+        The greatest relative deviation of a share's area from what is due to it.
     dropped
-        What no master can see and be home within its range.
+        Water that no master can survey and still get home within its range.
     warnings
-        What is to be known of shares that could not be balanced.
+        Warnings about shares that could not be balanced.
     partition
-        The mesh that was shared; None where one master has all.
+        The mesh that was shared; None if a single master has all of the free space.
     """
 
     areas: tuple[Polygon, ...]
@@ -81,19 +81,20 @@ def shared(
 ) -> Sharing:
     """Share the free space in proportion to what each master can cover: the range that its ways leave.
 
-    By antagonising wavefronts over a mesh, balanced (Balampanis, Maza and Ollero 2016, Algorithm 1 and section
-    VIII); see `balanced_partition`. Starts may coincide or lie ashore: waves begin in the nearest triangle.
+    Antagonising wavefronts over a mesh make the shares, which are then balanced (Balampanis, Maza and Ollero 2016,
+    Algorithm 1 and section VIII); see `balanced_partition`. Starts may coincide or lie ashore: waves
+    begin in the nearest triangle.
 
     Parameters
     ----------
     free
-        What is shared.
+        The free space.
     masters
-        One or more.
+        One or more vehicles.
     footprint_m
         The longest edge of the mesh; by default such that a share has about `TRIANGLES` triangles.
     water
-        What legs to and from the free space may cross; absent: the free space alone.
+        What legs to and from the free space may cross; by default the free space alone.
 
     Raises
     ------
@@ -137,18 +138,21 @@ def _footprint_m(free: Polygon, masters: int, footprint_m: float | None) -> floa
 
 
 def _edge_m(area: Polygon, triangles: int) -> float:
-    """The edge of equilateral triangles of which so many have the area, or, where it is thin, line its rim."""
+    """The edge of equilateral triangles of which so many fill the area or, where it is thin, line its border."""
     return max(math.sqrt(4.0 / math.sqrt(3.0) * area.area / triangles), area.length / triangles)
 
 
 def _within_reach(mesh: Mesh, reach: Reach) -> Mask:
-    """The triangles that some vehicle can see and be home, shape (m,): where they hang together with its start."""
+    """The triangles within reach of some vehicle that are connected to its nearest one, shape (m,)."""
+    # Reach is judged at centroids, so a triangle may be within reach beyond one that is not. A share is connected:
+    # such an island is of no use to it.
     first = np.argmin(reach.out_m + reach.home_m, axis=1)
     return propagate(mesh, first, np.logical_or.reduce(reach.allowed)).source >= 0
 
 
 def _by_length_left(partition: Partition, reach: Reach) -> Partition:
     """Shares balanced by what the ways to them leave: within `SETTLED`, or as well as was found."""
+    # A border that moves changes the ways, and they may jump: rounds need not converge, so the best one is kept.
     best, least = partition, _badness(partition, reach)
     for _ in range(ROUNDS):
         if _imbalance(partition, reach) <= SETTLED:
@@ -160,17 +164,17 @@ def _by_length_left(partition: Partition, reach: Reach) -> Partition:
 
 
 def _badness(partition: Partition, reach: Reach) -> float:
-    """What stands for the greatest spacing of shares."""
+    """A smooth stand-in for the greatest spacing of shares; less is better."""
     return float((partition.areas_m2 * _spacings_m(partition, reach) ** SPACING_POWER).sum())
 
 
 def _spacings_m(partition: Partition, reach: Reach) -> FloatArray:
-    """What every vehicle leaves between its legs, about, shape (k,): the area of its share for the length left."""
+    """The approximate spacing of every vehicle's legs, shape (k,): the area of its share over the length left."""
     return np.asarray(partition.areas_m2 / reach.left_m(partition.share))
 
 
 def _imbalance(partition: Partition, reach: Reach) -> float:
-    """The greatest deviation of a share's area from what the lengths left ask for, as a share of that."""
+    """The greatest relative deviation of a share's area from what the lengths left ask for."""
     due_m2 = due_areas_m2(partition.mesh, partition.share, reach.left_m(partition.share))
     return imbalance(partition.areas_m2, due_m2)
 
@@ -182,7 +186,7 @@ def _own(partition: Partition, reach: Reach) -> Mask:
 
 
 def _dropped(mesh: Mesh, kept: Mask, reason: str) -> Iterator[DroppedPart]:
-    """All triangles but some as water that is left out, the largest part first."""
+    """The triangles that are not `kept`, as water that is left out; the largest part first."""
     parts = shapely.get_parts(shapely.coverage_union_all(mesh.polygons[~kept]))
     for part in parts[np.argsort(-shapely.area(parts), kind="stable")].tolist():
         place = part.representative_point()
@@ -195,7 +199,7 @@ def _dropped(mesh: Mesh, kept: Mask, reason: str) -> Iterator[DroppedPart]:
 
 
 def _uneven(partition: Partition, reach: Reach, masters: Sequence[Vehicle]) -> str:
-    """Which shares differ most, and what would help."""
+    """A warning that names the shares that differ most, and what would help."""
     spacings_m = _spacings_m(partition, reach)
     dense, sparse = (masters[int(which)].name for which in (spacings_m.argmin(), spacings_m.argmax()))
     return (

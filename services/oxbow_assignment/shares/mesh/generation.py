@@ -1,4 +1,4 @@
-"""The mesh of an area: edges of one length, no triangle partly outside."""
+"""The mesh of an area: edges of about one length, and no triangle partly outside."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from oxbow_assignment.shares.mesh.triangulation import Triangulation
 __all__ = ["mesh_area"]
 
 PITCH = 0.85
-"""Pitch of the lattice, as a share of the longest edge: few edges become longer than allowed."""
+"""Pitch of the lattice as a fraction of the longest edge, so that few edges become longer than allowed."""
 
 FROM_BORDER = 0.65
-"""Points of the lattice nearer to the border than this share of its pitch are left out."""
+"""Lattice points nearer to the border than this fraction of the pitch are left out: they would make slivers."""
 
 RELAXATIONS = 20
 
 GREATEST_BOUND_DEG = 30.0
-"""Greatest bound on the least angle that can be asked for."""
+"""The greatest value of `least_angle_deg`."""
 
 MAX_TRIANGLES = 2_000_000
 
@@ -38,8 +38,9 @@ def mesh_area(
     """Tile an area with triangles whose edges are about, and never more than, `edge_m` long.
 
     Balampanis, Maza and Ollero 2016, section IV: the mesh is a constrained Delaunay triangulation, its longest
-    edge the footprint of the sensor. There CGAL refines it point by point. Here the border is divided evenly, an
-    equilateral lattice fills the inside, and Lloyd's relaxation (their section VIII) joins the two.
+    edge the footprint of the sensor. The paper refines it point by point with CGAL. This function divides the
+    border evenly, fills the inside with an equilateral lattice, and joins the two by Lloyd's relaxation (their
+    section VIII).
 
     Parameters
     ----------
@@ -48,16 +49,18 @@ def mesh_area(
     edge_m
         The longest edge: the footprint of the sensor.
     least_angle_deg
-        Triangles with a smaller angle are refined, but for such as the area's own angles and narrows enforce.
+        Triangles with a smaller angle are refined, except where the area's own angles and narrows enforce one;
+        0 to `GREATEST_BOUND_DEG`.
     relaxations
         Rounds of Lloyd's relaxation.
 
     Raises
     ------
     InvalidMission
-        The area or the edge is not fit for a mesh.
+        The area is empty or invalid, the edge or the angle is out of bounds, or the mesh would be far too large.
     """
     _require_fit(area, edge_m, least_angle_deg)
+    # About the middle of the area: far from the origin, cross products of coordinates would lose digits.
     origin = shapely.get_coordinates(area.envelope.centroid)[0]
     local = shapely.transform(shapely.orient_polygons(area), lambda xy: xy - origin)
     border = shapely.segmentize(local, PITCH * edge_m)

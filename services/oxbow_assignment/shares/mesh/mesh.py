@@ -20,7 +20,7 @@ __all__ = ["AngleStatistics", "Mesh"]
 
 @dataclass(frozen=True)
 class AngleStatistics:
-    """How even a mesh is (Balampanis, Maza and Ollero 2016, Table I); an equilateral triangle has 60 degrees.
+    """How even a mesh is (Balampanis, Maza and Ollero 2016, Table I); angles are 60 degrees at best.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ class Mesh:
         return np.asarray(triangle)
 
     def region(self, which: Mask) -> Polygon:
-        """The union of some triangles that hang together by edges: exact, as no edge is computed anew."""
+        """The union of some triangles that are connected by edges; exact, since no coordinate is computed anew."""
         merged = shapely.coverage_union_all(self.polygons[which])
-        assert isinstance(merged, Polygon), "these triangles do not hang together"
+        assert isinstance(merged, Polygon), "these triangles are not connected"
         return merged

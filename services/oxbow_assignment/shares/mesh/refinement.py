@@ -1,4 +1,4 @@
-"""Refinement: points put in where edges are too long or angles too small."""
+"""Refinement: points are added where edges are too long or angles too small."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from oxbow_assignment.shares.mesh.triangulation import Triangulation
 __all__ = ["refined"]
 
 FINEST = 1 / 16
-"""No edge is halved below this share of the longest: so refinement ends, however narrow the water."""
+"""No edge is halved below this fraction of `edge_m`, so that refinement ends, however narrow the water."""
 
 MAX_ROUNDS = 200
 
@@ -18,11 +18,25 @@ SIZE_TOLERANCE = 1e-9
 
 
 def refined(mesh: Triangulation, edge_m: float, least_angle_rad: float) -> Triangulation:
-    """Refine until no edge is longer than `edge_m`, and no angle less than the bound but where edges are least.
+    """Refine until no edge is longer than `edge_m`, and no angle less than the bound, except at the shortest.
 
     From every bad triangle the longest edges lead to one that is the longest of both its triangles, or lies on the
-    border (Rivara 1997); a point is put there: in the centroid of the two triangles (Rivara and Calderon 2010), or
-    in the middle of the border's edge.
+    border (Rivara 1997). A point is added there: at the centroid of the two triangles (Rivara and Calderon 2010),
+    or in the middle of the border's edge.
+
+    Parameters
+    ----------
+    mesh
+        What to refine.
+    edge_m
+        The longest edge.
+    least_angle_rad
+        Triangles with a smaller angle are refined; 0 for none.
+
+    Returns
+    -------
+    Triangulation
+        Tiles the same area.
     """
     for _ in range(MAX_ROUNDS):
         lengths = mesh.side_lengths
@@ -37,10 +51,10 @@ def refined(mesh: Triangulation, edge_m: float, least_angle_rad: float) -> Trian
 
 
 def _terminal_sides(mesh: Triangulation) -> Indices:
-    """For every triangle, where its path over longest sides ends; of a side's two numbers, the lower one.
+    """For every triangle, the side where its path over longest sides ends; of a side's two numbers, the lower one.
 
-    Pointer jumping: in each round, every triangle looks twice as far. Sides have an order that both their
-    triangles agree upon, equal ones too: a path that came back to its start would have no end.
+    By pointer jumping: in each round, every triangle looks twice as far. Both triangles of a side rank it alike,
+    even among sides of equal length: otherwise a path could come back to its start and never end.
     """
     numbers = np.arange(3 * len(mesh.triangles))
     edges = np.where(mesh.twins < 0, numbers, np.minimum(numbers, mesh.twins))
@@ -60,13 +74,14 @@ def _terminal_sides(mesh: Triangulation) -> Indices:
 
 
 def _with_terminal_points(mesh: Triangulation, terminal: Indices) -> Triangulation:
-    """A point for each terminal side: on it where it is border, else amid its two triangles."""
+    """A point is added for each terminal side: on it if it lies on the border, else amid its two triangles."""
     on_border = mesh.twins[terminal] < 0
     inner = terminal[~on_border]
     quadrilaterals = np.concatenate([inner // 3, mesh.twins[inner] // 3]).reshape(2, -1)
     areas = mesh.doubled_areas[quadrilaterals] / 2
     middles = mesh.corners[quadrilaterals].mean(axis=2)
     places = (areas[:, :, None] * middles).sum(axis=0) / areas.sum(axis=0)[:, None]
+    # Only now that the inner places are known: halving border sides changes the triangles beside them.
     if on_border.any():
         mesh = mesh.with_border_points(terminal[on_border])
     return mesh.with_points(places)

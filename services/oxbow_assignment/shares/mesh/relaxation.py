@@ -1,4 +1,4 @@
-"""Lloyd's relaxation: every inner point moves to the centre of what is nearest to it, again and again."""
+"""Lloyd's relaxation: every inner point moves repeatedly to the centroid of its Voronoi cell."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["relaxed"]
 
 
 GOOD_ANGLE_RAD = np.radians(40.0)
-"""Triangles whose least angle is greater may lose some of it."""
+"""A triangle whose least angle is greater than this may lose some of it in a move."""
 
 
 def relaxed(mesh: Triangulation, edge_m: float, rounds: int) -> Triangulation:
@@ -20,8 +20,22 @@ def relaxed(mesh: Triangulation, edge_m: float, rounds: int) -> Triangulation:
 
     Balampanis et al. 2016, section VIII, propose it for more homogeneous meshes. Within an obtuse triangle, whose
     circumcentre lies outside, cells meet at the middle of the longest side instead (Meyer et al. 2003, section
-    3.3): so no cell reaches over the border of the area. Next to the border, where points are fixed, centred
-    points can be too near or too far: no move may make a triangle worse that is not good.
+    3.3), so that no cell reaches over the border of the area. Next to the border, whose points are fixed,
+    centroids can be too near or too far: no move may make a triangle worse that is not good.
+
+    Parameters
+    ----------
+    mesh
+        Where the points start from.
+    edge_m
+        No move may make an edge longer than this, unless the triangle had a longer one already.
+    rounds
+        How many times all points move.
+
+    Returns
+    -------
+    Triangulation
+        As many points and triangles, of the same area.
     """
     for _ in range(rounds):
         aims = np.where(mesh.border_points[:, None], mesh.points, _cell_centroids(mesh))
@@ -30,8 +44,10 @@ def relaxed(mesh: Triangulation, edge_m: float, rounds: int) -> Triangulation:
 
 
 def _moved(mesh: Triangulation, aims: FloatArray, edge_m: float) -> Triangulation:
-    """Points moved to their aims, but for the corners of triangles that this would make worse."""
+    """Points moved to their aims, except the corners of triangles that this would make worse."""
     least_sine, longest = mesh.least_sines, mesh.side_lengths.max(axis=1)
+    # A corner that stays behind may spoil the next triangle, so this is repeated. Every round holds back at least
+    # one more point, so it ends. A triangle that turns over has a negative sine and thus counts as worse.
     while True:
         there = Triangulation(aims, mesh.triangles)
         sharper = there.least_sines < np.minimum(least_sine, np.sin(GOOD_ANGLE_RAD))

@@ -1,4 +1,4 @@
-"""A triangulation that is changed step by step: points put in, sides flipped, always tiling the same area."""
+"""A triangulation that is changed step by step: points are added and sides flipped; it always tiles one area."""
 
 from __future__ import annotations
 
@@ -25,15 +25,23 @@ from oxbow.tolerances import ROUNDING
 __all__ = ["Triangulation"]
 
 FLIP_TOLERANCE = 1e-10
-"""Sides whose opposite angles sum to less than pi and this are left: flipping them would gain nothing."""
+"""Radians by which the angles opposite a side must exceed pi in sum: below that, a flip would gain nothing."""
 
 MAX_FLIPS = 200
-"""Rounds of flips: rounding could let a few sides flip to and fro for ever."""
+"""Rounds of flips; without a bound, rounding could make a few sides flip back and forth forever."""
 
 
 @dataclass(frozen=True)
 class Triangulation:
-    """Triangles that tile an area; every change gives a new one that tiles the same area."""
+    """Triangles that tile an area; every change gives a new triangulation of the same area.
+
+    Parameters
+    ----------
+    points
+        The vertices, in planar metres, shape (n, 2).
+    triangles
+        Vertices of every triangle, counterclockwise, shape (m, 3).
+    """
 
     points: FloatArray
     triangles: Indices
@@ -55,7 +63,7 @@ class Triangulation:
 
     @cached_property
     def doubled_areas(self) -> FloatArray:
-        """Twice the area of every triangle, in m2; negative where it is turned over."""
+        """Twice the area of every triangle, in m2, shape (m,); negative if it is turned over."""
         return doubled_areas(self.corners)
 
     @cached_property
@@ -65,7 +73,8 @@ class Triangulation:
 
     @cached_property
     def least_sines(self) -> FloatArray:
-        """The sine of every triangle's least angle, opposite its shortest side; below 0 if turned over."""
+        """The sine of every triangle's least angle, shape (m,); negative if it is turned over."""
+        # The least angle lies opposite the shortest side.
         middle, longest = np.sort(self.side_lengths, axis=1)[:, 1:].T
         return np.asarray(self.doubled_areas / (middle * longest))
 
@@ -79,7 +88,7 @@ class Triangulation:
     def legalised(self) -> Triangulation:
         """The constrained Delaunay triangulation of the same points, by Lawson's flips (1977).
 
-        All sides that no other flip touches are flipped at once, round after round.
+        In every round, all sides whose flips do not touch one another are flipped at once.
         """
         triangles, twins = self.triangles, self.twins
         for _ in range(MAX_FLIPS):
@@ -95,13 +104,14 @@ class Triangulation:
         tree = shapely.STRtree(np.asarray(shapely.polygons(self.corners)))
         place, triangle = tree.query(shapely.points(places), predicate="intersects")
         holder = np.full(len(places), -1, dtype=np.intp)
+        # Backwards, so that on a shared edge the first triangle found is the one that stays.
         holder[place[::-1]] = triangle[::-1]
         return holder
 
     def with_points(self, places: FloatArray) -> Triangulation:
         """The constrained Delaunay triangulation with more points, all strictly inside the area.
 
-        In each round every triangle takes the point nearest to its middle, and is divided in three.
+        In each round every triangle takes the point nearest to its centroid and is divided in three.
         """
         mesh = self
         while len(places):
@@ -126,7 +136,7 @@ class Triangulation:
         return Triangulation(np.vstack([self.points, places]), np.vstack([triangles, more]))
 
     def with_border_points(self, sides: Indices) -> Triangulation:
-        """The constrained Delaunay triangulation with some border sides halved, one of a triangle at most."""
+        """The constrained Delaunay triangulation with some border sides halved, at most one per triangle."""
         tails, heads = self.triangles.ravel()[sides], self.triangles.ravel()[following(sides)]
         apex = apexes(self.triangles, sides)
         new = len(self.points) + np.arange(len(sides))
@@ -137,15 +147,16 @@ class Triangulation:
 
 
 def _flippable(points: FloatArray, triangles: Indices, twins: Indices) -> Indices:
-    """Numbers of sides that break the Delaunay criterion and can be flipped, no two of one triangle."""
+    """Sides that break the Delaunay criterion and can be flipped; no two belong to one triangle."""
     side = np.flatnonzero(twins > np.arange(len(twins)))
     tail, head = points[triangles.ravel()[side]], points[triangles.ravel()[following(side)]]
     apex, beyond = points[apexes(triangles, side)], points[apexes(triangles, twins[side])]
     excess = _angle(tail - apex, head - apex) + _angle(head - beyond, tail - beyond) - np.pi
+    # A flip in a quadrilateral that is not convex would turn a triangle over.
     least_new = np.minimum(cross(tail - apex, beyond - apex), cross(beyond - apex, head - apex))
     wrong = (excess > FLIP_TOLERANCE) & (least_new > -ROUNDING * np.ptp(points, axis=0).max() ** 2)
     side = side[wrong]
-    # Worst first; of the sides of one triangle, the worst alone.
+    # The worst side comes first: of the sides of one triangle, only the worst is flipped.
     order = np.argsort(-excess[wrong], kind="stable")
     side = side[order]
     rank = np.full(len(triangles), len(side), dtype=np.intp)

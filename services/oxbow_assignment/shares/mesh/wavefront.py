@@ -1,4 +1,4 @@
-"""Wavefronts over a mesh: who reaches a triangle first, and in how many steps."""
+"""Wavefronts over a mesh: which one reaches a triangle first, and in how many steps."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ UNREACHED = -1
 
 @dataclass(frozen=True)
 class Wavefront:
-    """What the wavefronts left on every triangle.
+    """What the wavefronts leave on every triangle.
 
     Parameters
     ----------
@@ -37,17 +37,18 @@ class Wavefront:
 def propagate(mesh: Mesh, starts: Sequence[int] | Indices, within: Mask | None = None) -> Wavefront:
     """Let antagonising wavefronts run from some triangles (Balampanis, Maza and Ollero 2016, Algorithm 1).
 
-    In every step each wave takes the free neighbours of what it took in the step before; where two waves reach a
-    triangle in one step, the one from the triangle of lower index has it. Depths begin at 0; in the paper at 1.
+    In every step each wave takes the free neighbours of what it took in the step before. Where two waves reach a
+    triangle in the same step, the one that comes from the triangle of lower index takes it. Depths begin at 0; in
+    the paper at 1.
 
     Parameters
     ----------
     mesh
         The mesh.
     starts
-        Triangles; of starts on one triangle, the first has it.
+        Numbers of triangles, one per wave; of several waves on one triangle, the first has it.
     within
-        The triangles that waves may enter, shape (m,); all where absent.
+        The triangles that waves may enter, shape (m,); all by default.
     """
     free = np.ones(len(mesh), dtype=bool) if within is None else within.copy()
     source, depth, branch = (np.full(len(mesh), UNREACHED, dtype=np.intp) for _ in range(3))
@@ -59,6 +60,7 @@ def propagate(mesh: Mesh, starts: Sequence[int] | Indices, within: Mask | None =
         reached = mesh.neighbours[front].ravel()
         by = np.repeat(front, 3)
         opens = np.flatnonzero((reached >= 0) & free[reached])
+        # The front is sorted, and `unique` finds first occurrences: the parent of lowest index wins.
         following, at = np.unique(reached[opens], return_index=True)
         parent = by[opens[at]]
         source[following], depth[following], free[following] = source[parent], step, False
