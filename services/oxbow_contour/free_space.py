@@ -54,6 +54,18 @@ def default_tolerance_m(safety_m: float, spacing_m: float) -> float:
 
     That is half a percent of the spacing, or a twentieth of the safety distance where that is more, but at most
     one percent of the spacing.
+
+    Parameters
+    ----------
+    safety_m
+        Distance to keep from the shore.
+    spacing_m
+        The nominal spacing.
+
+    Returns
+    -------
+    float
+        In metres.
     """
     return float(np.clip(safety_m / 20, spacing_m / 200, spacing_m / 100))
 

@@ -1,4 +1,4 @@
-"""Which water is planned on: the one where the first vehicle starts, and all of them are."""
+"""Which water is planned on: that of the first vehicle's start, where all other places have to be too."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ PRECISION = 1e-3
 def home_water(waters: Sequence[Polygon], request: ContourRequest, narrows: BaseGeometry) -> Polygon:
     """The connected water that is planned on.
 
-    It is the nearest to where the first vehicle starts; the largest, where nobody starts. A vehicle may be carried
-    to the nearest water, and no farther: from water without room for the safety distance no way leads on.
+    It is the nearest to where the first vehicle starts, or the largest where no vehicle starts. A vehicle may be
+    carried to the nearest water, and no farther: from water without room for the safety distance no way leads on.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def home_water(waters: Sequence[Polygon], request: ContourRequest, narrows: Base
     request
         Its places, each at most its shore tolerance from where a vehicle may go.
     narrows
-        Water that is none of these, as it is too narrow.
+        The rest of the water, which is too narrow.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def _in_a_pocket(
 
 @dataclass(frozen=True)
 class _Barrier:
-    """What a straight way leads over that is no water wide enough: how many metres of each.
+    """What a straight way leads over other than water wide enough: how many metres of each.
 
     `zones_m` lie in forbidden zones, `land_m` off the outline, `narrows_m` in water that is too narrow.
     """
@@ -120,7 +120,7 @@ class _Barrier:
 
     @classmethod
     def on(cls, way: BaseGeometry, request: ContourRequest, narrows: BaseGeometry) -> _Barrier:
-        """What there is on a way."""
+        """What a way leads over."""
         afloat = way.intersection(request.outline)
         return cls(
             zones_m=afloat.intersection(shapely.union_all(list(request.zones))).length,
@@ -142,7 +142,7 @@ class _Barrier:
 
     @property
     def remedy(self) -> str:
-        """What would help, but for another place."""
+        """What would help, other than another place."""
         zones = ", or forbidden zones that leave a way there" if self.zones_m > ROUNDING_M else ""
         return zones + (", or less for Least_width" if self.narrows_m > ROUNDING_M else "")
 

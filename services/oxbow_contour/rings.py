@@ -23,7 +23,20 @@ def rings_of(polygons: Polygon | Sequence[Polygon | MultiPolygon] | GeometryArra
 
 
 def runs_of(ring: FloatArray, edges: int) -> GeometryArray:
-    """A closed ring as line strings of so many edges, the last one of what is left."""
+    """A closed ring as line strings, each of a few of its edges.
+
+    Parameters
+    ----------
+    ring
+        Shape (n, 2), its first vertex repeated at the end.
+    edges
+        How many edges make up each line string; the last one has what is left.
+
+    Returns
+    -------
+    ndarray of LineString, shape (m,)
+        In the order of the ring.
+    """
     first = np.arange(0, len(ring) - 1, edges)
     sizes = np.minimum(first + edges, len(ring) - 1) - first + 1
     offset = np.cumsum(sizes) - sizes

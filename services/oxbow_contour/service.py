@@ -23,7 +23,7 @@ from oxbow_contour.water import true_water
 __all__ = ["handle"]
 
 MOSTLY = 0.5
-"""Where a smaller share of the water is free, the scale of detail is that of the free space."""
+"""Where a smaller share of the water is free, the free space sets the scale of detail."""
 
 LEAST_LOST_M2 = 0.01
 """Less narrow water than this is not worth a figure."""
@@ -34,6 +34,18 @@ OTHER_WATER = "in water that is not connected to that of the launch point"
 
 def handle(request: ContourRequest, show: Show) -> FreeSpace:
     """Choose the water that is planned on, simplify its contours, erode it by the safety distance.
+
+    Parameters
+    ----------
+    request
+        The site, the distances to keep, and the places where vehicles start and are recovered.
+    show
+        Receives the layers `raw`, `simplified`, `eroded`, `dropped` and `figures`.
+
+    Returns
+    -------
+    FreeSpace
+        Its largest part, the water that it lies in, and what was dropped.
 
     Raises
     ------
@@ -149,7 +161,7 @@ def _narrow(water: MultiPolygon, opened: MultiPolygon, request: ContourRequest) 
     if opened.equals_exact(without_narrows(water, 0.0), tolerance=0.0):
         return ()
     lost_m2 = max(water.area - opened.area, 0.0)
-    lost = f"{lost_m2:.2g} m2 together" if lost_m2 >= LEAST_LOST_M2 else "seams without an area"
+    lost = f"{lost_m2:.2g} m2 in all" if lost_m2 >= LEAST_LOST_M2 else "seams without an area"
     return (f"water narrower than Least_width = {request.least_width_m:g} m is left out: {lost}",)
 
 
@@ -157,10 +169,8 @@ def _summary(dropped: tuple[DroppedPart, ...]) -> tuple[str, ...]:
     if not dropped:
         return ()
     area_m2 = sum(part.area_m2 for part in dropped)
-    return (
-        f"dropped, for want of a connection to the water that is planned on: {len(dropped)} of {area_m2:.0f} m2"
-        " together",
-    )
+    parts = "1 part" if len(dropped) == 1 else f"{len(dropped)} parts"
+    return (f"dropped {parts}, {area_m2:.0f} m2 in all, not connected to the water that is planned on",)
 
 
 def _show_result(eroded: Eroded, dropped: tuple[DroppedPart, ...], show: Show) -> None:

@@ -138,7 +138,7 @@ def _grouped(rings: list[FloatArray], counts: list[int]) -> list[list[FloatArray
 
 
 def _without_islands(polygon: Polygon) -> Polygon | MultiPolygon:
-    """What the exterior ring surrounds and no other does.
+    """What the exterior ring surrounds and no other ring does.
 
     An island nearer to the shore than the tolerance may have changed sides without crossing it.
     """

@@ -44,13 +44,34 @@ def is_safe(free: Polygon, water: Sequence[Polygon], safety_m: float) -> bool:
 
 
 def inscribed_radius_m(water: Sequence[Polygon], precision_m: float) -> float:
-    """The radius of the largest circle in the water, at most `precision_m` too small."""
+    """The radius of the largest circle in the water.
+
+    Parameters
+    ----------
+    water
+        Parts of the water, at least one, in metres.
+    precision_m
+        How much too small the radius may be.
+
+    Returns
+    -------
+    float
+        In metres, never too large.
+    """
     circles = shapely.maximum_inscribed_circle(np.array(water, dtype=object), precision_m)
     return float(shapely.length(circles).max())
 
 
 def rounded_down(value: float, digits: int = 3) -> float:
-    """A number that is not negative, rounded down to so many significant digits."""
+    """A number rounded down to a few significant digits.
+
+    Parameters
+    ----------
+    value
+        Not negative.
+    digits
+        How many to keep.
+    """
     if value == 0.0:
         return 0.0
     unit = 10.0 ** (math.floor(math.log10(value)) + 1 - digits)

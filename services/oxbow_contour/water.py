@@ -16,12 +16,25 @@ __all__ = ["true_water"]
 def true_water(outline: Polygon, zones: Sequence[Polygon]) -> tuple[Polygon, ...]:
     """The parts of the outline that no zone covers, not simplified.
 
+    Parameters
+    ----------
+    outline
+        The site's outline, without holes.
+    zones
+        Forbidden zones; they may overlap, and reach beyond the outline.
+
+    Returns
+    -------
+    tuple of Polygon
+        With disjoint interiors; at least one.
+
     Raises
     ------
     Infeasible
         The zones cover the whole outline.
     """
     land = shapely.get_parts(shapely.union_all(list(zones)))
+    # Islands are the common case; a difference with 3 600 of them takes ten times as long as this test.
     if _are_islands(land, outline):
         return (Polygon(outline.exterior, [island.exterior for island in land]),)
     water = outline.difference(shapely.multipolygons(land))

@@ -119,5 +119,6 @@ def _sector(behind: _Arc, ahead: _Arc) -> float:
     """Angle of the water between the end of one arc and the start of another: clockwise, in (0, 2 pi]."""
     back = behind.points[-2] - behind.points[-1]
     forth = ahead.points[1] - ahead.points[0]
+    # Straight back is a full turn: an arc bounds no water of angle 0.
     turn = math.atan2(back[1], back[0]) - math.atan2(forth[1], forth[0])
     return turn % (2 * math.pi) or 2 * math.pi

@@ -99,6 +99,7 @@ class _Sweep:
 
     def _split(self, at: Extreme) -> CriticalKind:
         position = self._position(at.place)
+        # Between the middles of two cells, the vertex lies in the upper half of one or the lower half of the next.
         cell = max(self.line[max(position - 1, 0) : position + 1], key=lambda cell: cell.margin(at.place))
         floor_at, ceiling_at = cell.floor.cut_below(at.place), cell.ceiling.cut_above(at.place)
         position = self._end(cell, floor_at, ceiling_at)

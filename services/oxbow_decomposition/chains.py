@@ -28,7 +28,7 @@ So a straight shore along the transects is upright, not a saw of critical points
 """
 
 SHORTEST_EDGE = 16.0
-"""Vertices within this many steps of the one before them repeat it: the turn at so short an edge is noise."""
+"""Vertices within this many steps of the one before count as repeating it: the turn at such an edge is noise."""
 
 TURN_ERROR = 4.0 * 2.0**-53
 """Bound of the relative rounding error of a turn in floating point (Shewchuk 1997, section 4.1)."""
@@ -36,7 +36,7 @@ TURN_ERROR = 4.0 * 2.0**-53
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A place (u, v) on a chain, with the vertices from `index` on after it; `column` is u as it is compared."""
+    """A place (u, v) on a chain, before its vertices from `index` on; `column` is u rounded for comparison."""
 
     column: float
     u: float
@@ -91,9 +91,16 @@ class Chain:
         return Mark(vertex.column, vertex.u, v, index)
 
     def between(self, start: Mark, end: Mark) -> FloatArray:
-        """The part of the chain from one mark to another, shape (n, 2), u non-decreasing, no point repeated."""
+        """The part of the chain from one mark to another, shape (n, 2), u non-decreasing, no point repeated.
+
+        Parameters
+        ----------
+        start, end
+            Places on this chain, in its order.
+        """
         inner = self.points[start.index : end.index]
         points = np.concatenate([[(start.u, start.v)], inner, [(end.u, end.v)]])
+        # Vertices are ordered by rounded u; their own u may be out of order by less than a step of the grid.
         points[:, 0] = np.clip(np.maximum.accumulate(points[:, 0]), start.u, end.u)
         return distinct(points)
 
@@ -102,8 +109,8 @@ class Chain:
 class Extreme:
     """A vertex at which two chains begin (a minimum) or end.
 
-    `floor` has water above it, `ceiling` has water below it. `opens` tells of a minimum that the water lies
-    between the two (an open), not around them (a split); what a maximum does shows in the sweep.
+    `floor` has water above it, `ceiling` has water below it. `opens` is whether the water at a minimum lies
+    between the two (an open), not around them (a split). What a maximum does shows only in the sweep.
     """
 
     place: Mark
@@ -149,6 +156,7 @@ def _of_walk(planar: FloatArray, heading_rad: float, grid: float) -> Iterator[Ex
     rising = _rising(compared)
     ends = np.flatnonzero(rising != np.roll(rising, 1))
     ends = ends if rising[ends[0]] else np.roll(ends, 1)
+    # Where rounding has put three vertices in line, the planar ones decide, which no rotation has touched.
     turns = _turns(compared, ends[::2])
     turns = np.where(turns == 0, _turns(planar, ends[::2]), turns)
 

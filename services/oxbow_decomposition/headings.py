@@ -21,7 +21,7 @@ DETAIL = 0.25
 """Bends of the shore smaller than this, in spacings, do not count."""
 
 ACROSS, ALONG = 0.25, 0.75
-"""Metres of path for a metre of shore, fitted to plans of lakes at eight headings each (R2 0.8 within a lake)."""
+"""Metres of path per metre of shore, fitted to plans of lakes at eight headings each (R2 0.8 within a lake)."""
 
 
 def scored_headings(free: Polygon, spacing_m: float) -> tuple[HeadingScore, ...]:

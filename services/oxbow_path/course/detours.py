@@ -28,10 +28,10 @@ HALF_WIDTH = 0.12
 """Half width of a detour at first, in spacings: narrow, so that it parts the water that it runs into."""
 
 GAP = 0.02
-"""A strip keeps so far from the rest of the path, in half widths."""
+"""How far a strip keeps from the rest of the path, in half widths."""
 
 SHORT_OF = 0.25
-"""A detour ends so far from the place that it is made for, in spacings."""
+"""How far a detour ends from the place that it is made for, in spacings."""
 
 NARROWINGS = 4
 """How often a strip's width is halved until the path crosses it once."""
@@ -39,7 +39,7 @@ NARROWINGS = 4
 ROUNDS = 3
 
 MOST_AT_ONCE = 100
-"""Of the places far from the path, so many are looked at in one round."""
+"""At most this many of the places far from the path are looked at in one round."""
 
 LEAST_SHARE = 0.002
 """A length left that is less than this share of the spacing is not worth a detour."""
@@ -100,7 +100,7 @@ def _spread(points: FloatArray, distance_m: FloatArray, apart_m: float) -> Indic
 
 
 class _Ways:
-    """Ways to a path, which are searched when the first is asked for, and hold for what it is led round to."""
+    """Ways to a path: searched once, when the first is asked for, and still used once the path has detours."""
 
     def __init__(self, path: LineString, waters: Waters) -> None:
         self._path = path
@@ -113,7 +113,19 @@ class _Ways:
 
 
 def detoured(path: LineString, waters: Waters, gap: FloatArray, left_m: float) -> LineString | None:
-    """The path with one detour all the way to a place, no longer by more than `left_m`; None where none fits."""
+    """The path with one detour all the way to a place; None where none fits.
+
+    Parameters
+    ----------
+    path
+        Simple, and inside the free space but for its legs.
+    waters
+        The water and its routes.
+    gap
+        The place, shape (2,), in metres.
+    left_m
+        How much longer the path may become.
+    """
     return _detoured(path, _Ways(path, waters), gap, left_m, short_of=0.0)
 
 

@@ -72,7 +72,20 @@ class Middles:
         return cls(pieces, np.sort(shores, axis=1), widths, int(shore[np.argmin(mesh.points[:, 0])]))
 
     def loops(self, spacing_m: float, most_m: float) -> tuple[LinearRing, ...]:
-        """Loops no longer than allowed, most of whose way is narrow: round one island, and round several."""
+        """Loops most of whose way is narrow: round one island, and round several.
+
+        Parameters
+        ----------
+        spacing_m
+            What narrow is measured against.
+        most_m
+            How long a loop may be.
+
+        Returns
+        -------
+        tuple of LinearRing
+            At most two, in metres; none where no island has narrow water round it.
+        """
         sets = list(self._growing(spacing_m, most_m))
         loops = [self._loop(inside) for inside in [*sets[:1], *sets[1:][-1:]]]
         return tuple(loop for loop in loops if loop is not None and loop.length <= most_m)

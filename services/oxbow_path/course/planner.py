@@ -26,7 +26,8 @@ from oxbow_path.walk.trial import CUT, Pattern
 __all__ = ["best_plan"]
 
 WAYS = 4.0
-"""A walk from launch to recovery goes there, back and there: below so many shortest ways, one way is tried."""
+"""A walk from launch to recovery goes there, back and there again: the shortest way alone is tried, too, where the
+length is less than this many of it."""
 
 REACH = 0.5
 """Water nearer to the course than this, in spacings, needs no detour."""
@@ -35,6 +36,7 @@ FAR = 0.75
 """Where length is plentiful, water farther from a path than this, in spacings, gets a detour."""
 
 EVENNESS_QUANTILE = 0.95
+"""The share of the water whose distance counts in a score, besides the largest one."""
 
 GOOD = 1.6
 """A plan whose `_score_m` is no more spacings than this is taken at once: the other would hardly do better."""
@@ -51,6 +53,15 @@ NARROW = 2.65
 
 def best_plan(method: PathMethod, task: Task, display: Display) -> MethodPlan:
     """The plan of a method, or along a course where that leaves less water far away.
+
+    Parameters
+    ----------
+    method
+        Plans by its own pattern.
+    task
+        The request made ready.
+    display
+        Shows what is tried.
 
     Raises
     ------
@@ -108,7 +119,7 @@ def _at_least(task: Task, display: Display, courses: Sequence[LineString], refus
     Raises
     ------
     Infeasible
-        It does not, or is none from one place to another.
+        It does not suffice, the shortest way is not simple, or launch and recovery are one place.
     """
     if task.waters.launch.place == task.waters.recovery.place:
         raise _too_short(task, courses) or refusal

@@ -29,28 +29,28 @@ from oxbow_path.tour.sight import Sight
 __all__ = ["Geodesics", "Shore"]
 
 SITES_IN_SIGHT = 12
-"""How many of the nearest sites a site looks for."""
+"""How many of the nearest sites are tried for sight from a site."""
 
 CORNERS_IN_SIGHT = 8
-"""How many of the nearest corners of the shore a site or corner looks for."""
+"""How many of the nearest corners of the shore are tried for sight from a site or corner."""
 
 TOUCH_M = 1e-6
-"""A line that comes so near to where rings touch does not pass there."""
+"""A line that comes this near to where rings touch does not pass there."""
 
 LEAST_STEP_M = 1e-9
-"""A sparse matrix drops zeros."""
+"""Added to every step, as a sparse matrix drops zeros."""
 
 FIRST_REACH = 1.5
-"""A search for a way goes so many times as far as the straight line, then twice as far each time it fails."""
+"""A search for a way first goes this many times as far as the straight line, and each failure doubles that."""
 
 DOUBLINGS = 7
-"""After so many a search goes everywhere."""
+"""After this many a search goes everywhere."""
 
 TOGETHER = 64
-"""So many ways are searched for at once: each search copies the graph."""
+"""At most this many ways are searched for at once: each search copies the graph."""
 
 CHUNK = 256
-"""So many sites are sources of one search, to bound its memory."""
+"""At most this many sites are sources of one search, to bound its memory."""
 
 
 class Shore:
@@ -129,6 +129,7 @@ class Geodesics:
         shortest_first = np.lexsort((b, a, length))
         shortest_first = shortest_first[a[shortest_first] < b[shortest_first]]
         a, b, length = a[shortest_first], b[shortest_first], length[shortest_first]
+        # Of legs between the same two sites `unique` keeps the first: the shortest, in this order.
         _, first = np.unique(a.astype(np.int64) * self.count + b, return_index=True)
         shape = (self.count, self.count)
         return csr_array(minimum_spanning_tree(coo_array((length[first], (a[first], b[first])), shape=shape)))
@@ -138,7 +139,13 @@ class Geodesics:
         return np.asarray(dijkstra(self.graph, indices=np.array([site]))[0, : self.count])
 
     def between_m(self, starts: Indices, goals: Indices) -> FloatArray:
-        """The distances of pairs of sites, shape (n,), found without going much farther."""
+        """The distances of pairs of sites, shape (n,), found without searching much farther than these.
+
+        Parameters
+        ----------
+        starts, goals
+            The numbers of the sites, shape (n,).
+        """
         return np.array([leg.length_m for leg in self._legs(starts, goals)])
 
     def way(self, order: Sequence[int] | Indices) -> FloatArray:
@@ -159,6 +166,7 @@ class Geodesics:
         fresh = np.array(sorted({pair for pair in pairs if pair not in self._known}), dtype=np.intp).reshape(-1, 2)
         apart_m = np.hypot(*(self.places[fresh[:, 1]] - self.places[fresh[:, 0]]).T) + LEAST_STEP_M
         nearest_first = np.argsort(apart_m, kind="stable")
+        # Those of like distance are searched for together: the farthest of them sets the limit for all.
         for first in range(0, len(fresh), TOGETHER):
             chosen = nearest_first[first : first + TOGETHER]
             for leg in self._search(fresh[chosen], FIRST_REACH * float(apart_m[chosen].max())):

@@ -24,8 +24,10 @@ from oxbow_path.tour.start import Start
 __all__ = ["shortened"]
 
 NEIGHBOURS = 8
+"""How many of the nearest sites a move may join a site to."""
+
 SEGMENT = 3
-"""Or-opt moves so many sites at most."""
+"""Or-opt moves at most this many sites."""
 
 KICKS = 5
 """Kicks per site."""
@@ -33,13 +35,13 @@ KICKS = 5
 MOST_KICKS = 10_000
 
 ROUND = 1000
-"""So many kicks are tried before what they gain is looked at."""
+"""How many kicks are tried before their gain decides on more."""
 
 LEAST_ROUND = 5e-4
 """A round of kicks that shortens a tour by a smaller part is the last."""
 
 WALK = 3
-"""The legs of a kick start so many steps, from near site to near site, from one another."""
+"""Steps from near site to near site between a kick's first leg and either other."""
 
 LEAST_SITES = 8
 """Fewer sites are not kicked."""
@@ -51,7 +53,20 @@ Step = Callable[[int], int]
 
 
 def shortened(start: Start, *, seed: int) -> Solution:
-    """Shorten a tour: a `Solver`."""
+    """Shorten a tour: a `Solver`.
+
+    Parameters
+    ----------
+    start
+        A tour, and the distances of near sites.
+    seed
+        Of the kicks.
+
+    Returns
+    -------
+    Solution
+        No longer than the start.
+    """
     search = _Search(start)
     search.descend(start.order.tolist())
     count = len(start.order)
@@ -156,6 +171,7 @@ class _Search:
         if gain_m <= self._least_gain_m:
             return None
         first, last = (b, c) if onward == self._after else (c, b)
+        # Turning the stretch from b to c round joins a to c and b to d.
         self._reverse(self._at[first], self._at[last])
         return _Move(gain_m, (a, b, c, d))
 

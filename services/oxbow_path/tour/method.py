@@ -15,6 +15,13 @@ __all__ = ["tour"]
 def tour(task: Task, display: Display) -> MethodPlan:
     """Plan a path along a tour, and refine it.
 
+    Parameters
+    ----------
+    task
+        The request made ready.
+    display
+        Shows every trial, the chosen tour, and the refinement.
+
     Raises
     ------
     Infeasible

@@ -27,7 +27,7 @@ QUAD_SEGS = 2
 """Lanes have ends of few corners: every corner is a waypoint."""
 
 PARTING = 3
-"""Where so many stretches of a tour end, it meets itself."""
+"""Where this many stretches of a tour end, it meets itself."""
 
 
 def enclosed(way: FloatArray, free: Polygon, lane_m: float) -> Polygon:
@@ -77,6 +77,7 @@ def _is_odd(faces: Geometries, way: FloatArray) -> Mask:
     face, edge = edges.query(shapely.linestrings(ray))
     (x, y), (x0, y0), (x1, y1) = inner[face].T, way[edge].T, way[edge + 1].T
     spans = (y0 > y) != (y1 > y)
+    # Level edges span no ray; the 1 only avoids a division by zero.
     rise = np.where(y1 == y0, 1.0, y1 - y0)
     right = x0 + (y - y0) / rise * (x1 - x0) > x
     return np.asarray(np.bincount(face, spans & right, len(faces)) % 2 == 1)

@@ -51,7 +51,7 @@ LEAST_SITES = 4
 """Fewer sites have one tour only."""
 
 NEAR = 4.0
-"""Sites no farther apart than this may follow each other, in pitches."""
+"""Sites farther apart than this, in pitches, do not follow each other, but for legs of the first tour."""
 
 GAP = 0.85
 """Water farther than this from every site is given one more, in pitches."""
@@ -149,6 +149,7 @@ def plan_tour(task: Task, *, solver: Solver | None = None) -> TourPlan:
     if not any(_is_enough(trial, budget, most) for trial in trials):
         trials.extend(_shortened(attempt, trials, budget))
     fitting = [trial for trial in trials if trial.fits(budget)]
+    # The trials end with a tour of the entries alone: where that does not fit, no tour does.
     if not fitting:
         shortest_m = min(trial.length_m for trial in trials)
         raise budget.too_short(shortest_m)
@@ -191,7 +192,7 @@ class _Attempt:
         return Shore(self.waters.free)
 
     def tour(self, count: int) -> Tour:
-        """A tour of so many clusters; with none, of the entries alone."""
+        """A tour of `count` clusters; with none, of the entries alone."""
         pitch_m = math.sqrt(self.waters.free.area / count) if count else self.waters.spacing_m
         entries = np.unique(shapely.get_coordinates(self.waters.entries), axis=0)
         geodesics = self._shore.geodesics(self._sites(entries, count, pitch_m))

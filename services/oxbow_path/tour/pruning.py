@@ -46,6 +46,7 @@ def pruned(order: Indices, geodesics: Geodesics, *, kept: int, length_m: float) 
     heapq.heapify(gains)
     while gains and tour.length_m > length_m:
         gain, site = heapq.heappop(gains)
+        # Gains on the heap are not updated: one that has changed was pushed again, and this entry is stale.
         if site in tour.after and -gain == tour.gain(site):
             for beside in tour.leave_out(site):
                 if beside >= kept:

@@ -25,7 +25,7 @@ MOST_SITES = 3000
 ITERATIONS = 100
 
 UNITS = 1000
-"""PyVRP computes with whole numbers: so many make up the mean distance of near sites."""
+"""PyVRP computes with integers: the mean distance of near sites is this many."""
 
 FORBIDDEN = 1000
 """What a leg between sites that are not near costs, in mean distances."""
@@ -37,7 +37,20 @@ def is_installed() -> bool:
 
 
 def polished(start: Start, *, seed: int) -> Solution:
-    """Shorten a tour by the project's own search, then by PyVRP's: a `Solver`."""
+    """Shorten a tour by the project's own search, then by PyVRP's: a `Solver`.
+
+    Parameters
+    ----------
+    start
+        A tour, and the distances of near sites.
+    seed
+        Of both searches.
+
+    Returns
+    -------
+    Solution
+        PyVRP's tour where it is the shorter one and keeps to legs of near sites; else the project's own.
+    """
     own = shortened(start, seed=seed)
     if len(own.order) > MOST_SITES:
         return own

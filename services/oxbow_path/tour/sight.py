@@ -29,7 +29,21 @@ class Sight:
         self._free = free
 
     def along(self, places: FloatArray, pairs: Indices, lines: Geometries) -> Mask:
-        """Whether the straight lines (n,) between pairs (n, 2) of places (m, 2) stay in the water."""
+        """Whether straight lines between places stay in the water.
+
+        Parameters
+        ----------
+        places
+            Shape (m, 2), in metres, in the water or on its shore.
+        pairs
+            Numbers of the places that each line joins, shape (n, 2).
+        lines
+            The lines themselves, shape (n,).
+
+        Returns
+        -------
+        ndarray of bool, shape (n,)
+        """
         begins, ends = places[pairs[:, 0]], places[pairs[:, 1]]
         line, side = self._index.query(lines)
         a, b = self._sides[side, 0], self._sides[side, 1]

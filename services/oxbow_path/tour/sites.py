@@ -14,7 +14,7 @@ from oxbow.geometry.triangles import spread
 __all__ = ["clustered", "low_discrepancy", "with_gaps"]
 
 ROUNDS = 12
-"""Rounds of Lloyd's algorithm; the first points of the sequence are nearly even already."""
+"""Rounds of Lloyd's algorithm: few, as the first points of the sequence are nearly even already."""
 
 
 def low_discrepancy(free: Polygon, count: int, *, seed: int) -> FloatArray:
@@ -58,7 +58,8 @@ def clustered(samples: FloatArray, count: int, free: Polygon) -> FloatArray:
 
     Returns
     -------
-    array, shape (count, 2)
+    array, shape (n, 2)
+        Sorted by x, then y; n is `count`, less centres that coincide.
     """
     centres = samples[:count]
     for _ in range(ROUNDS):
@@ -73,7 +74,22 @@ def clustered(samples: FloatArray, count: int, free: Polygon) -> FloatArray:
 
 
 def with_gaps(sites: FloatArray, points: FloatArray, reach_m: float) -> FloatArray:
-    """The sites, and points made sites, the farthest first, until none is farther than `reach_m` from one."""
+    """The sites, and points made sites, the farthest first, until none is farther than `reach_m` from one.
+
+    Parameters
+    ----------
+    sites
+        Shape (n, 2), in metres.
+    points
+        Which places are to have a site near, shape (m, 2).
+    reach_m
+        How near.
+
+    Returns
+    -------
+    ndarray, shape (k, 2)
+        The given sites first.
+    """
     distance, _ = cKDTree(sites).query(points)
     gaps = points[np.argsort(-distance, kind="stable")[: np.count_nonzero(distance > reach_m)]]
     if len(gaps) == 0:

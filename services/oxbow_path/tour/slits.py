@@ -4,7 +4,7 @@ A region is in one piece if and only if nothing outside it, slits included, runs
 tested where it lies, without a look at the rest of the region: the places where it meets what is outside must
 belong to as many parts of that. The rings of the region and of the slits divide it into corners, edges and faces.
 What these make up runs round nothing if and only if corners less edges plus faces are as many as the parts in
-which it hangs together (Euler's formula), so that what is added is counted alone. Faces with holes need no care:
+which it is connected (Euler's formula), so that only what is added is counted. Faces with holes need no care:
 nothing but the face joins its rings, so that they are taken for parts of their own, and the face for one without
 holes.
 """
@@ -38,7 +38,7 @@ def slit(region: Polygon, slits: Geometries) -> Polygon:
     Parameters
     ----------
     region
-        The region, perhaps with holes; m.
+        The region, perhaps with holes, in metres.
     slits : array of Polygon, shape (n,)
         Areas that may reach beyond it, and overlap one another.
     """
@@ -64,6 +64,13 @@ def slit_in_turn(region: Polygon, slits: Geometries) -> Polygon:
     """The region less as many slits as leave it in one piece, first come, first served.
 
     All are tried at once, and where that parts it, one half of them after the other.
+
+    Parameters
+    ----------
+    region
+        The region, in one piece, perhaps with holes, in metres.
+    slits : array of Polygon, shape (n,)
+        Areas that may reach beyond it, and overlap one another; at least one.
     """
     outside, cut = _Outside(region, slits), np.zeros(len(slits), dtype=bool)
     untried = [np.arange(len(slits))]
@@ -148,14 +155,14 @@ def _steps(faces: Geometries) -> tuple[Indices, Indices]:
 
 
 def _parts(count: int, pairs: Indices) -> Indices:
-    """Which of the parts that pairs join each of so many things belongs to."""
+    """The part of each of `count` things, shape (count,), where pairs (m, 2) join things into parts."""
     joined = np.ones(len(pairs), dtype=bool)
     graph = coo_array((joined, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def _grouped(values: Indices, group: Indices, count: int) -> Sequence[Indices]:
-    """The values of each of so many groups."""
+    """The values of each of `count` groups."""
     order = np.argsort(group, kind="stable")
     bounds = np.searchsorted(group[order], np.arange(count + 1))
     return [values[order[first:last]] for first, last in pairwise(bounds)]

@@ -21,7 +21,7 @@ class Start:
     distances: csr_array[np.float64]
 
     def length_m(self, order: Indices) -> float:
-        """Of a tour whose legs are all among the distances."""
+        """The length of a tour whose legs are all among the distances; others count as 0."""
         return float(np.asarray(self.distances[order, np.roll(order, -1)]).sum())
 
 
@@ -37,7 +37,7 @@ def first_tour(geodesics: Geodesics, limit_m: float) -> Start:
     geodesics
         Between at least three sites.
     limit_m
-        Near sites are no farther apart.
+        The greatest distance of near sites.
     """
     order = _round_tree(geodesics.spanning_tree())
     near = geodesics.near(limit_m)
@@ -53,6 +53,7 @@ def _round_tree(tree: csr_array[np.float64]) -> Indices:
         beside[a].append(b)
         beside[b].append(a)
     parents, outward = {0: 0}, [0]
+    # The list grows while it is read: breadth first, so that every child comes after its parent.
     for site in outward:
         children = [other for other in beside[site] if other != parents[site]]
         parents.update(dict.fromkeys(children, site))
