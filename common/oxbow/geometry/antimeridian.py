@@ -16,11 +16,11 @@ __all__ = ["Joined", "joined_at_antimeridian"]
 
 ANTIMERIDIAN = 180.0
 SNAP_DEG = 1e-6
-"""What lies no farther from the antimeridian, a tenth of a metre, lies on it: cuts are rounded."""
+"""Anything this close to the antimeridian, a tenth of a metre, lies on it: cuts are rounded."""
 MOST_REACH_DEG = 90.0
-"""A polygon with a place farther from the antimeridian was not cut there: it goes round the Earth."""
+"""A polygon that reaches farther than this from the antimeridian was not cut there: it goes round the Earth."""
 DECIMALS = 12
-"""Of degrees: as given, after they were turned to the other side of the Earth and back."""
+"""Degrees are rounded to this many decimals: adding 360 and subtracting it again costs the last digits."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,8 @@ def joined_at_antimeridian(polygons: Sequence[Sequence[FloatArray]]) -> list[Joi
     Returns
     -------
     list of Joined
-        In the order of their first parts; what shares no stretch of the antimeridian with another is as given.
+        In the order of their first parts. A polygon that shares no stretch of the antimeridian with another is
+        returned as given.
     """
     turned = {index: _turned(rings) for index, rings in enumerate(polygons) if _may_be_cut(rings)}
     united = [joined for joined in _united(turned) if len(joined.members) > 1]
@@ -52,7 +53,8 @@ def joined_at_antimeridian(polygons: Sequence[Sequence[FloatArray]]) -> list[Joi
 
 
 def _united(polygons: Mapping[int, Polygon]) -> Iterator[Joined]:
-    """What polygons are together, with the keys of those that each is made of."""
+    """The unions of touching polygons, with the keys of the polygons that each is made of."""
+    # An invalid polygon could make the union fail; it stays as given, to be refused where its field is known.
     sound = {key: polygon for key, polygon in polygons.items() if is_valid(polygon)}
     wholes = shapely.get_parts(shapely.union_all(list(sound.values())))
     inside = {key: polygon.representative_point() for key, polygon in sound.items()}

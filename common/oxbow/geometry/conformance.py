@@ -1,11 +1,12 @@
 """Whether a path keeps the rules: in the water, clear of the shore but for its legs, and never across itself.
 
-The mission's own water is what counts, not a planner's picture of it. The certificate reports these figures, and
-the pipeline takes them once more before a plan leaves, so that no single wrong stage can send a boat ashore.
+Paths are judged against the mission's own water, not a planner's picture of it. The certificate reports these
+figures, and the pipeline computes them once more before a plan leaves, so that no single wrong stage can send a
+boat ashore.
 
 A *leg* is the stretch of a path next to its launch or recovery point that runs nearer to the shore than the
-safety distance. The point itself makes a leg necessary where it lies ashore, in a harbour or up a creek. What
-exceeds that, and all that happens between the legs, is a fault.
+safety distance. The point itself makes a leg necessary where it lies ashore, in a harbour or up a creek. Whatever
+exceeds that is a fault, and so is any breach between the legs.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ from oxbow.tolerances import ROUNDING_M
 __all__ = ["Conduct", "Shore", "crossings_of", "strays"]
 
 SHORE_TOLERANCE_M = 0.01
-"""A path this near to the shore is on it, and stretches this short are none: degrees of seven decimals are a
-centimetre."""
+"""A path this close to the shore is on it, and shorter stretches do not count: the seventh decimal of a degree is
+a centimetre."""
 
 SAME_PLACE_M = 1.0
 """A path that begins farther than this from its launch point has no leg there that could be excused."""
@@ -39,16 +40,16 @@ SAFETY_SHARE = 0.99
 """The share of the safety distance that must be kept: eroded contours are polygons, not arcs."""
 
 OPEN_SHARE = 2.0
-"""A safe stretch shorter than so many safety distances does not end a leg, wherever it is."""
+"""A safe stretch shorter than this many safety distances does not end a leg, wherever it is."""
 
 BASIN_SHARE = 1.05
-"""Water farther from the shore than so many safety distances is free, whatever the planner simplified."""
+"""Water farther from the shore than this many safety distances is free, whatever the planner simplified."""
 
 LOOK_SHARE = 4.0
-"""So many safety distances of a safe stretch are looked at to tell a basin from a wide spot of a creek."""
+"""A basin is distinguished from a wide spot of a creek by this many safety distances of a safe stretch."""
 
 RUN = 8
-"""Edges of the shore that are looked at together."""
+"""Edges of the shore per entry of the index."""
 
 QUAD_SEGS = 16
 _CHUNK = 512
@@ -67,7 +68,7 @@ class Conduct:
     legs
         Of the launch and of the recovery.
     faults
-        What breaks a rule; nothing, of a path that is fit to follow.
+        Every broken rule; empty for a path that is fit to follow.
     """
 
     outside_m: float
@@ -82,7 +83,7 @@ class Conduct:
 
 
 class Shore:
-    """The shore of a mission's water, ready to judge paths.
+    """The shore of a mission's water, prepared to judge paths against.
 
     Time and memory grow with the vertices of the shore and the stretches of path near it, not with the area.
 
@@ -93,7 +94,7 @@ class Shore:
     safety_m
         The distance that paths keep from its boundary.
     least_width_m
-        Narrower water is no water to be reached from ashore.
+        A vehicle cannot take to the water where it is narrower than this.
     """
 
     def __init__(self, water: Polygon | MultiPolygon, safety_m: float, least_width_m: float = 0.0) -> None:
@@ -114,7 +115,15 @@ class Shore:
         return shapely.get_parts(without_narrows(self.water, self.least_width_m))
 
     def conduct(self, path: LineString, launch: Place, recovery: Place) -> Conduct:
-        """Judge a path from `launch` to `recovery`."""
+        """How a path from `launch` to `recovery` keeps the rules.
+
+        Parameters
+        ----------
+        path
+            From launch to recovery, in metres; of positive length.
+        launch, recovery
+            Where the vehicle starts and ends. A path that begins or ends more than 1 m away has no leg there.
+        """
         segments = _Segments.of(path)
         outside = self._outside(segments)
         unsafe = self._unsafe(segments, outside)
@@ -146,12 +155,13 @@ class Shore:
         distance_m = SAFETY_SHARE * self.safety_m
         if distance_m <= SHORE_TOLERANCE_M:
             return outside
+        # Far inland no shore is near: only together do the two cover a path over land.
         return _merged(np.vstack([outside, self._near(segments, distance_m)]))
 
     def _near(self, segments: _Segments, distance_m: float) -> FloatArray:
         """Stretches of a path that are nearer to the shore than a distance."""
         found = [np.empty((0, 2))]
-        # In parts, since a path that is one tangle along the shore has pairs by the square of its length.
+        # In parts: in a path that is one tangle along the shore, pairs grow with the square of its length.
         for first in range(0, len(segments.lines), _CHUNK):
             lines = segments.lines[first : first + _CHUNK]
             segment, run = self._runs.query(lines, predicate="dwithin", distance=distance_m)
@@ -164,9 +174,10 @@ class Shore:
     def _leg_lengths(self, path: LineString, unsafe: FloatArray) -> tuple[float, float]:
         """How far a path's first and its last leg reach.
 
-        Of a path that never comes to open water, only what begins and what ends it.
+        Where a path never comes to open water, its legs are only the unsafe stretches at its very ends.
         """
         out_m = self._reach_m(path, unsafe)
+        # Reversed both ways, stretches of the reversed path begin before they end, and are in order again.
         home_m = self._reach_m(path.reverse(), path.length - unsafe[::-1, ::-1])
         if out_m + home_m < path.length:
             return out_m, home_m
@@ -194,7 +205,7 @@ class Shore:
         return bool(shapely.dwithin(self._basins_beside(stretch), stretch, near_m).any())
 
     def _basins_beside(self, way: BaseGeometry) -> Geometries:
-        """What is certainly free water near a way, those parts of it that are basins."""
+        """The basins among the parts of the certainly free water near a way."""
         distance_m = BASIN_SHARE * self.safety_m
         beside = way.buffer(OPEN_SHARE * self.safety_m)
         near = self._runs.query(beside, predicate="dwithin", distance=distance_m)
@@ -226,9 +237,9 @@ class Shore:
         return float(shapely.length(land[shapely.distance(land, place) <= ROUNDING_M]).sum())
 
     def _shortest_m(self, end: _End, path: LineString) -> float:
-        """The shortest way from a place to open water, looked for beside a leg, in metres.
+        """The length of the shortest way from a place to open water, searched for beside a leg, in metres.
 
-        Open water is where the leg ends, and what it passes on its way there.
+        Open water is where the leg ends, and any basin that it passes on its way there.
         """
         way = substring(path, *end.stretch)
         parts = shapely.get_parts(way.buffer(OPEN_SHARE * self.safety_m).intersection(self.water))
@@ -272,6 +283,7 @@ class _Segments:
     def of(cls, path: LineString) -> _Segments:
         xy = shapely.get_coordinates(path)
         ends = np.stack([xy[:-1], xy[1:]], axis=1)
+        # A repeated point makes a segment without a direction, by whose length `at` would divide.
         ends = ends[(ends[:, 0] != ends[:, 1]).any(axis=1)]
         length_m = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
         end_m = np.cumsum(length_m)
@@ -292,11 +304,22 @@ class _Segments:
         parts, segment = parts[lines], segment[lines]
         ends = np.stack([shapely.get_coordinates(shapely.get_point(parts, at)) for at in (0, -1)], axis=1)
         along = np.hypot(*(ends - self.ends[segment, :1]).transpose(2, 0, 1)) + self.start_m[segment, None]
+        # An overlay may return a part in either direction.
         return np.asarray(np.sort(along, axis=1))
 
 
 def strays(path: LineString, free: Polygon, launch: Place, recovery: Place) -> list[BaseGeometry]:
-    """The stretches of a path outside a free space that are no legs: they neither begin nor end it."""
+    """The stretches of a path outside a free space that are not legs: they touch neither launch nor recovery.
+
+    Parameters
+    ----------
+    path
+        From launch to recovery, in metres.
+    free
+        Where the path should stay, to within rounding.
+    launch, recovery
+        What begins or ends at one of these places is a leg.
+    """
     segments = np.asarray(_Segments.of(path).lines)
     grown = free.buffer(ROUNDING_M)
     shapely.prepare(grown)
@@ -308,7 +331,7 @@ def strays(path: LineString, free: Polygon, launch: Place, recovery: Place) -> l
 
 
 def crossings_of(path: LineString) -> tuple[Fault, ...]:
-    """Where a path meets itself, neighbouring segments aside: nothing, if and only if it is simple.
+    """Where a path meets itself, neighbouring segments aside: empty if and only if the path is simple.
 
     One fault: its `metres` are 0, and `count` is the number of pairs of segments that meet. The first and the last
     segment of a closed path are neighbours. A path that only folds back upon its end counts as one crossing.
@@ -319,7 +342,7 @@ def crossings_of(path: LineString) -> tuple[Fault, ...]:
     last = len(lines) - 1
     tree = STRtree(lines)
     count, place = 0, shapely.get_coordinates(path)[-1]
-    # In parts, since a path that is one tangle has pairs by the square of its length.
+    # In parts: in a path that is one tangle, the number of pairs grows with the square of its length.
     for start in range(0, len(lines), _CHUNK):
         i, j = tree.query(lines[start : start + _CHUNK], predicate="intersects")
         i += start
@@ -361,23 +384,24 @@ def _runs_of(ring: FloatArray) -> Geometries:
 
 
 def _merged(stretches: FloatArray) -> FloatArray:
-    """The same stretches in order, those that meet as one."""
+    """The same stretches in order, with those that meet joined."""
     if len(stretches) == 0:
         return stretches
     stretches = stretches[np.argsort(stretches[:, 0], kind="stable")]
+    # A stretch may lie inside an earlier one: what counts is the farthest end so far.
     reach = np.maximum.accumulate(stretches[:, 1])
     first = np.flatnonzero(np.concatenate([[True], stretches[1:, 0] > reach[:-1]]))
     return np.column_stack([stretches[first, 0], reach[np.append(first[1:] - 1, len(reach) - 1)]])
 
 
 def _rest(stretches: FloatArray, total_m: float) -> FloatArray:
-    """What ordered stretches leave of a path."""
+    """The stretches of a path between some ordered ones."""
     rest = np.column_stack([np.append(0.0, stretches[:, 1]), np.append(stretches[:, 0], total_m)])
     return np.asarray(rest[rest[:, 1] > rest[:, 0]])
 
 
 def _within(stretches: FloatArray, start_m: float, end_m: float) -> FloatArray:
-    """What of some stretches lies in another."""
+    """Some stretches, clipped to another."""
     clipped = np.clip(stretches, start_m, max(start_m, end_m))
     return np.asarray(clipped[clipped[:, 1] > clipped[:, 0]])
 

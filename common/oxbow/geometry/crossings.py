@@ -1,7 +1,7 @@
-"""Where the edges of contours meet, looked for in bounded time and memory.
+"""Where the edges of contours meet, found in bounded time and memory.
 
-Two contours of n edges may cross n^2 times, and edges that never meet may still have boxes that do, which is
-all that an index of them knows. What a drawn or surveyed contour has is a few of either an edge.
+Two contours of n edges may cross n^2 times. Edges that never meet may still have bounding boxes that do, and an
+index knows only boxes. A drawn or surveyed contour has a few crossings and a few such pairs per edge.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from oxbow.arrays import FloatArray, Geometries, Indices, Mask, Place
 __all__ = ["MOST_PAIRS", "Edges", "TooManyPairs", "is_valid", "self_contact"]
 
 MOST_PAIRS = 50_000_000
-"""Pairs of edges whose boxes meet, of contours that are looked at together; shores have some four an edge."""
+"""The most pairs of edges with boxes that meet, in contours checked together; shores have some four per edge."""
 _SAMPLE = 512
-"""So many edges, or all, show how many pairs there will be."""
+"""How many edges are sampled to estimate the number of pairs; all, where there are fewer."""
 _BLOCK = 8
-"""Edges in line that are looked at together: neighbours are found in the same place of the index."""
+"""Successive edges that are looked up together: neighbours are found in the same place of the index."""
 _PAIRS_AT_ONCE = 2_000_000
 
 
@@ -34,12 +34,12 @@ class TooManyPairs(Exception):
 
 
 def self_contact(polygon: Polygon) -> Place | None:
-    """A place where a polygon without holes meets itself, if it does.
+    """A place where a polygon without holes meets itself; None where it does not.
 
     Raises
     ------
     TooManyPairs
-        It cannot be told in bounded time.
+        It cannot be decided in bounded time.
     """
     for contact in _sampled_contacts(polygon):
         return float(contact[0]), float(contact[1])
@@ -55,7 +55,7 @@ def is_valid(geometry: BaseGeometry) -> bool:
     Raises
     ------
     TooManyPairs
-        It cannot be told in bounded time.
+        It cannot be decided in bounded time.
     """
     return next(_sampled_contacts(geometry), None) is None and _is_valid(geometry)
 
@@ -66,7 +66,7 @@ def _is_valid(geometry: BaseGeometry) -> bool:
 
 
 def _sampled_contacts(geometry: BaseGeometry) -> Iterator[FloatArray]:
-    """Places where some edges of a geometry meet others of their ring; none of one whose edges are few."""
+    """Places where a sample of a geometry's edges meets others of the same ring; nothing where edges are few."""
     if int(shapely.get_num_coordinates(geometry)) ** 2 <= MOST_PAIRS:
         return
     edges = Edges.of(shapely.get_parts([geometry]))
@@ -116,21 +116,21 @@ class Edges:
     def meetings(self, of: Mask | None = None, *, sample: int | None = None) -> Iterator[Indices]:
         """Pairs of edges that meet inside at least one of the two, shape (pairs, 2), part by part.
 
-        Edges that share an end, or are the same, do not meet for that: as neighbours in a ring, and the common
-        borders of two. The order of the parts is shuffled, always in the same way, so that a crossing among many
-        is found at once.
+        Edges that merely share an end, as neighbours in a ring do, do not count as meeting, nor do equal edges, as
+        on a border that two polygons share. The order of the parts is shuffled, always in the same way, so that a
+        crossing among many is found at once.
 
         Parameters
         ----------
         of
-            Edges of which one at least is in each pair; all where absent.
+            Each pair contains at least one of these edges; by default, any edges.
         sample
-            Look for the meetings of so many edges; of all where absent.
+            Look for the meetings of only this many edges; by default, of all.
 
         Raises
         ------
         TooManyPairs
-            As soon as a sample shows that there would be more than `MOST_PAIRS` to look at.
+            As soon as a sample shows that more than `MOST_PAIRS` would have to be checked.
         """
         wanted = np.ones(len(self), dtype=bool) if of is None else of
         order = _shuffled(np.flatnonzero(wanted))
@@ -141,21 +141,23 @@ class Edges:
             first, second = tree.query(self._lines[queried])
             first = queried[first]
             begin, pairs = begin + len(queried), pairs + len(first)
+            # Two edges that are both looked up find each other twice; the pair counts once.
             fresh = (first < second) | ~wanted[second]
             yield self._meeting(first[fresh], second[fresh])
             if pairs * len(order) > MOST_PAIRS * max(begin, min(_SAMPLE, len(order))):
                 raise TooManyPairs
+            # Each edge finds itself, so pairs > 0. At most doubled: a dense part may follow a sparse one.
             size = int(np.clip(_PAIRS_AT_ONCE * begin / pairs, 1, 2 * size))
 
     def contacts(self, pairs: Indices) -> FloatArray:
-        """Where pairs of edges meet, shape (n, 2), in the order of the edges; not where rounding makes them."""
+        """Where pairs of edges meet, shape (n, 2), in the order of the edges; not where it is only rounding."""
         pairs = pairs[np.lexsort(pairs.T[::-1])]
         both = shapely.intersection(self._lines[pairs[:, 0]], self._lines[pairs[:, 1]])
         coordinates, owner = shapely.get_coordinates(both, return_index=True)
         return coordinates[np.unique(owner, return_index=True)[1]]
 
     def _meeting(self, first: Indices, second: Indices) -> Indices:
-        """Those of pairs of edges that meet inside one of them."""
+        """The pairs of edges that meet inside at least one of the two."""
         a, b = self.ends[first].swapaxes(0, 1)
         c, d = self.ends[second].swapaxes(0, 1)
         sides = _side(a, b, c), _side(a, b, d), _side(c, d, a), _side(c, d, b)
@@ -172,7 +174,7 @@ def _side(start: FloatArray, end: FloatArray, point: FloatArray) -> FloatArray:
 
 
 def _between(point: FloatArray, start: FloatArray, end: FloatArray) -> Mask:
-    """Whether a point on an edge's line lies between its ends, and is none of them."""
+    """Whether a point on an edge's line lies strictly between its ends."""
     along = end - start
     at = ((point - start) * along).sum(axis=1)
     inside: Mask = (at > 0) & (at < (along * along).sum(axis=1))

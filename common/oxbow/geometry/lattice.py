@@ -1,4 +1,4 @@
-"""Lattices of places in an area: their cost is that of the places and the shore, whatever box lies round them."""
+"""Lattices of places in an area. Cost grows with the places and the shore, not with the bounding box."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def lattice_within(
     """The places of a lattice that lie in an area.
 
     Row k of the lattice is the line y = origin_y + k row_m. The shore crosses it at places between which the line
-    is in the area and outside it by turns (the scan lines of Wylie et al. 1967): only what is in the area is made.
+    is alternately inside and outside the area (the scan lines of Wylie et al. 1967): only places inside are made.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def lattice_within(
     origin
         A place of the lattice, on an even row.
     pitch_m, row_m
-        Distances of neighbours in a row, and of rows.
+        Distances between neighbours in a row, and between rows; positive.
     shift_m
         How far odd rows are moved on.
 
@@ -63,7 +63,7 @@ def _crossings(area: BaseGeometry, first_row_m: float, row_m: float) -> tuple[In
 
 
 def _counted(counts: Indices) -> tuple[Indices, Indices]:
-    """For each owner as often as it counts (none where negative): the owner's index, and a number from 0."""
+    """Each owner's index, repeated as often as its count (never where negative), and a running number from 0."""
     counts = np.maximum(counts, 0)
     owner = np.repeat(np.arange(len(counts)), counts)
     return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)

@@ -38,8 +38,8 @@ def reeb_graph(decomposition: Decomposition) -> nx.MultiGraph[int]:
 def cell_polygon(cell: Cell) -> Polygon:
     """The cell's outline in the sweep frame; empty where the cell has no width.
 
-    A cell between two critical points of equal u has no width and no area: it stands in the decomposition
-    because the Reeb graph needs it.
+    A cell between two critical points of equal u has no width and no area: it is in the decomposition because the
+    Reeb graph needs it.
     """
     if cell.floor[0, 0] == cell.floor[-1, 0]:
         return Polygon()

@@ -42,25 +42,40 @@ def triangulated(faces: BaseGeometry | Geometries) -> tuple[FloatArray, Indices]
     -------
     points : ndarray, shape (n, 2)
     triangles : ndarray of int, shape (m, 3)
-        None has its corners in line, but where points are one but for rounding.
+        Corners are never in line, except where points differ only by rounding.
     """
     points, index = np.unique(_corners(faces).reshape(-1, 2), axis=0, return_inverse=True)
     return points, _without_flats(points, index.reshape(-1, 3))
 
 
 def spread(square: FloatArray, region: BaseGeometry) -> FloatArray:
-    """Carry points (n, 2) of the unit square onto a region, equal areas onto equal areas.
+    """Carry points of the unit square onto a region, equal areas onto equal areas.
 
     Triangles of the region are laid end to end by area. The first coordinate chooses one, and how far across it;
     the second one chooses how far along. No point is lost, however thin the region.
+
+    Parameters
+    ----------
+    square : ndarray, shape (n, 2)
+        Points of the unit square.
+    region
+        Valid polygons of positive area.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Points of the region, in its coordinates.
     """
     corners = _corners(region)
+    # Rounding may turn a sliver over: a negative area would break the order of the sums.
     areas_m2 = np.maximum(doubled_areas(corners), 0.0) / 2
     ends_m2 = np.cumsum(areas_m2)
     at_m2 = square[:, 0] * ends_m2[-1]
+    # From the right: a triangle without area is passed over, and never divided by.
     chosen = np.minimum(np.searchsorted(ends_m2, at_m2, side="right"), len(ends_m2) - 1)
     left = np.clip((ends_m2[chosen] - at_m2) / areas_m2[chosen], 0.0, 1.0)
     a, b, c = np.moveaxis(corners[chosen], 1, 0)
+    # The part of a triangle within a share s of its height from the apex has the share s^2 of its area.
     from_apex, along = np.sqrt(left)[:, None], square[:, 1:]
     return np.asarray((1 - from_apex) * c + from_apex * ((1 - along) * b + along * a))
 
@@ -74,7 +89,18 @@ def twins_of(triangles: Indices) -> Indices:
 
 
 def paired(tails: Indices, heads: Indices) -> tuple[Indices, Indices]:
-    """Which sides run between the same two points: indices of the one and of the other."""
+    """Which sides run between the same two points.
+
+    Parameters
+    ----------
+    tails, heads : ndarray of int, shape (m,)
+        The points that each side runs between; no more than two sides between the same two.
+
+    Returns
+    -------
+    one, other : ndarray of int, shape (k,)
+        Indices into the sides: `one[i]` and `other[i]` run between the same points, either way.
+    """
     key = _keys(tails, heads, max(tails.max(initial=0), heads.max(initial=0)) + 1)
     order = np.argsort(key, kind="stable")
     same = np.flatnonzero(key[order[1:]] == key[order[:-1]])
@@ -82,7 +108,7 @@ def paired(tails: Indices, heads: Indices) -> tuple[Indices, Indices]:
 
 
 def _keys(tails: Indices, heads: Indices, count: int) -> Indices:
-    """One number for each side between two of so many points, whichever way it runs."""
+    """One number for each side between two of `count` points, whichever way it runs."""
     return np.asarray(np.minimum(tails, heads) * count + np.maximum(tails, heads))
 
 
@@ -92,14 +118,34 @@ def following(sides: Indices) -> Indices:
 
 
 def apexes(triangles: Indices, sides: Indices) -> Indices:
-    """The corners opposite some sides, as indices into the points."""
+    """The corners opposite some sides, as indices into the points, shape (k,).
+
+    Parameters
+    ----------
+    triangles : ndarray of int, shape (m, 3)
+        Corners of each, as indices into the points.
+    sides : ndarray of int, shape (k,)
+        Numbers of sides.
+    """
     return np.asarray(triangles[sides // 3, sides % 3 - 1])
 
 
 def flipped(triangles: Indices, sides: Indices, twins: Indices) -> Indices:
     """The triangles after some sides gave way to the other diagonal of the quadrilateral that they halve.
 
-    No two of the sides belong to one triangle.
+    Parameters
+    ----------
+    triangles : ndarray of int, shape (m, 3)
+        Left as they are.
+    sides : ndarray of int, shape (k,)
+        The sides that give way. No triangle belongs to two of the pairs of a side and its twin.
+    twins : ndarray of int, shape (k,)
+        The twin of each of these sides; none is on the border.
+
+    Returns
+    -------
+    ndarray of int, shape (m, 3)
+        Of the two triangles at a side each keeps its place in the array.
     """
     (t, j), u = np.divmod(sides, 3), twins // 3
     tail, head, apex, beyond = triangles[t, j], triangles[t, j - 2], triangles[t, j - 1], apexes(triangles, twins)
@@ -110,7 +156,13 @@ def flipped(triangles: Indices, sides: Indices, twins: Indices) -> Indices:
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """The cross product of plane vectors, over the last axis: positive where b lies to the left of a."""
+    """The cross product of plane vectors, over the last axis: positive where b lies to the left of a.
+
+    Parameters
+    ----------
+    a, b : ndarray, shape (..., 2)
+        Shapes that broadcast.
+    """
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
@@ -127,6 +179,7 @@ def side_lengths(corners: FloatArray) -> FloatArray:
 
 def angles_rad(corners: FloatArray) -> FloatArray:
     """The angle at each corner, shape (m, 3)."""
+    # arctan2, since the arccosine loses half the digits near 0 and half a turn.
     ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     return np.asarray(np.arctan2(cross(ahead, behind), (ahead * behind).sum(axis=2)))
 
@@ -139,13 +192,13 @@ def _corners(faces: BaseGeometry | Geometries) -> FloatArray:
 
 
 def _without_flats(points: FloatArray, triangles: Indices) -> Indices:
-    """Triangles without those that have no height, which points in line make.
+    """Triangles without those of no height, which points in line make.
 
-    A flat triangle's longest side is flipped, longer ones before their neighbours: so flips do not undo one
-    another. One with a longest side on the border has no area to lose. A needle, two corners of which are one but
-    for rounding, has two such sides, and none to flip. Near needles stay flat whichever side is flipped, and
-    rounding decides which of their sides is the longest: what has been flipped away does not come back, lest two
-    of them flip one side to and fro.
+    A flat triangle's longest side is flipped, longer ones before their neighbours, so that flips do not undo one
+    another. One whose longest side is on the border is dropped: it has no area. A needle, two corners of which
+    differ only by rounding, has two longest sides, and none to flip. Near needles stay flat whichever side is
+    flipped, and rounding decides which of their sides is the longest: a side that has been flipped away does not
+    come back, or two of them could flip one side to and fro for ever.
     """
     rounding_m = ROUNDING * float(np.abs(points).max(initial=0.0))
     gone = np.empty(0, dtype=np.intp)
@@ -172,7 +225,7 @@ def _without_flats(points: FloatArray, triangles: Indices) -> Indices:
 
 
 def _first_claims(triangles: Indices, neighbours: Indices) -> Mask:
-    """Which pairs of a triangle and a neighbour hold neither triangle of an earlier pair."""
+    """Which pairs of a triangle and a neighbour share no triangle with an earlier pair."""
     rank = np.arange(len(triangles))
     first = np.full(max(triangles.max(), neighbours.max()) + 1, len(rank))
     np.minimum.at(first, triangles, rank)

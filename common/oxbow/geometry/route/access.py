@@ -17,10 +17,10 @@ from oxbow.tolerances import ON_SHORE_M, ROUNDING_M
 __all__ = ["Landing", "leg_routes", "way_to"]
 
 DETAIL = 4.0
-"""Gates of narrow water stand no farther apart than so many times the distance from free space to the shore."""
+"""Gates of narrow water are at most this many times the distance from the free space to the shore apart."""
 
 MOST_GATES = 20_000
-"""Of a long shore, gates stand so much farther apart that there are at most about so many."""
+"""About the most gates along a shore: on a longer one, they are farther apart."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Landing:
     place
         Where it stands: in the water, on its shore or ashore.
     berth
-        The nearest place of the water: the same, where it stands in the water.
+        The nearest place of the water: `place` itself where that is in the water.
     """
 
     place: Place
@@ -40,7 +40,15 @@ class Landing:
 
     @classmethod
     def of(cls, place: Place, water: BaseGeometry) -> Landing:
-        """Where a vehicle at a place takes to the water."""
+        """Where a vehicle at a place takes to the water.
+
+        Parameters
+        ----------
+        place
+            In the water, on its shore or ashore.
+        water
+            Polygons, in metres.
+        """
         point = Point(place)
         if shapely.dwithin(water, point, 0.0):
             return cls(place, place)
@@ -59,7 +67,7 @@ class Landing:
 
     @property
     def off_shore_m(self) -> float:
-        """How far a place on the shore is from the water: by a hair, or by rounding."""
+        """How far a place counted as on the shore is from the water in fact: a few millimetres, or rounding."""
         return self._distance_m - self.land_m
 
     @property
@@ -72,9 +80,16 @@ class Landing:
 
 
 def leg_routes(free: BaseGeometry, water: Polygon) -> Routes:
-    """Routes for legs to the free space: fine enough that none begins down a dead end of the creek it leaves.
+    """Routes for legs to the free space: fine enough that none begins along a dead end of the creek it leaves.
 
-    Where water is narrower than twice the safety distance, gates stand as close as about twice that width.
+    Where water is narrower than twice the safety distance, gates are about as close as twice that width.
+
+    Parameters
+    ----------
+    free
+        Where paths run: the water eroded by the safety distance.
+    water
+        What legs may cross on their way to the free space.
     """
     clearance_m = float(free.boundary.distance(water.boundary))
     if clearance_m <= ROUNDING_M:
@@ -85,17 +100,17 @@ def leg_routes(free: BaseGeometry, water: Polygon) -> Routes:
 def way_to(area: BaseGeometry, routes: Routes, place: Place) -> FloatArray:
     """The way from a place to where it first meets an area, shape (n, 2).
 
-    From ashore straight to the nearest place of the water, and on as from there. In the water straight to the
-    nearest place of the area, where that keeps to the water; else along its middle.
+    A way from ashore leads straight to the nearest place of the water, and on as from there. In the water it leads
+    straight to the nearest place of the area where that line keeps to the water, and along the middle otherwise.
 
     Parameters
     ----------
     area
-        Where to, in the water; parts of it may lie apart.
+        The destination, in the water; parts of it may lie apart.
     routes
         Routes through the water.
     place
-        Where from, outside the area or in it.
+        The start, outside the area or in it.
 
     Raises
     ------

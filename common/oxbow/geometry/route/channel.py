@@ -1,8 +1,8 @@
 """Routes through a channel of triangles.
 
 M. Innocenti, L. Pollini and A. Bracci (2006), section 2.4.1, step c, after M. Kallmann (2005), *Path planning in
-triangulations*: the cheapest chain of adjacent triangles between start and goal, as ways over the middles of the
-sides between triangles count. What route is drawn through the chain is the matter of each method.
+triangulations*: the cheapest chain of adjacent triangles between start and goal, measured along the middles of the
+sides between triangles. Each method draws its own route through the chain.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Channel:
     start, goal : ndarray, shape (2,)
         In the first and in the last triangle, in metres.
     left, right : ndarray, shape (k, 2)
-        The ends of the gates between triangles, as seen by who passes them.
+        The ends of the gates between triangles, as seen on the way from start to goal.
     corners : ndarray, shape (k + 1, 3, 2)
         The triangles; one where start and goal lie in one.
     """

@@ -1,15 +1,16 @@
-"""Danger zones: what it may cost to travel through them, and how probable harm is on the way.
+"""Danger zones: the cost of travelling through them, and the probability of harm on the way.
 
-M. Innocenti, L. Pollini and A. Bracci (2006), section 3. A route of L edges k that do harm with probabilities P_k
-does harm with P_P = 1 - prod(1 - P_k). The report lets an edge of length c_k cost c_k + c_MAX log(a / (1 - P_k)),
-so that costs add up along a route while probabilities multiply: W_P = sum(c_k) + c_MAX (L log(a) - log(1 - P_P)).
+M. Innocenti, L. Pollini and A. Bracci (2006), section 3. A route of L edges k, with probabilities of harm P_k,
+has the probability of harm P_P = 1 - prod(1 - P_k). In the report an edge of length c_k costs
+c_k + c_MAX log(a / (1 - P_k)), so that costs add up along a route while probabilities multiply:
+W_P = sum(c_k) + c_MAX (L log(a) - log(1 - P_P)).
 
-Departure: here W_P = sum(c_k) - c_MAX a log(1 - P_P). The report's term L log(a) counts edges, dangerous or
-not: it depends on how a route is divided, and sends a vehicle of large a through a zone wherever the way round it
-has more edges: the less fit vehicle goes where the fitter one does not. As a factor of the hazard -log(1 - P_k), a
-acts where danger is and nowhere else: one crossing counts for a vehicle of factor a as a crossings for one of
-factor 1. Of two cheapest routes, that for the larger a never has the greater P_P: W_P is a length plus a times a
-hazard, and what minimises such a sum has the less of a term the more that counts.
+Departure: in this module W_P = sum(c_k) - c_MAX a log(1 - P_P). The report's term L log(a) counts edges, dangerous
+or not: it depends on how a route is divided, and sends a vehicle of large a through a zone wherever the way round
+it has more edges: the less fit vehicle goes where the fitter one does not. As a factor of the hazard -log(1 -
+P_k), a acts where danger is and nowhere else: one crossing counts for a vehicle of factor a as a crossings for one
+of factor 1. Of two cheapest routes, that for the larger a never has the greater P_P: W_P is a length plus a times
+a hazard, and what minimises such a sum has the less of a term the more that counts.
 
 Further departures: a zone's probability holds for each metre or for each crossing, and P_k of an edge follows from
 how much of the zone it passes, so that W_P and P_P do not depend on how a route is divided into edges; a zone
@@ -34,19 +35,19 @@ from oxbow.errors import InvalidMission
 __all__ = ["NO_DANGER", "Danger"]
 
 RIM_M = 1e-6
-"""What of a zone's rim is not in it: a route along the outline runs outside, however it is rounded."""
+"""Width of a zone's rim that does not count: a route along the outline is outside, however it is rounded."""
 
 
 @dataclass(frozen=True)
 class Danger:
-    """All danger zones, and what one vehicle makes of them.
+    """All danger zones, and how much they count for one vehicle.
 
     Parameters
     ----------
     zones
-        Where danger is; zones may overlap.
+        The areas of danger; they may overlap.
     c_max_m
-        The report's c_max: the detour, in metres, that a chance of no harm e times as good is worth.
+        The report's c_max: the detour, in metres, that raising the chance of no harm by a factor of e is worth.
     a
         The report's a, >= 1: how many times as much a hazard counts for a vehicle less fit for it.
 
@@ -67,13 +68,25 @@ class Danger:
             raise InvalidMission(f"is {self.a!r}; expected a finite number, >= 1", where="a")
 
     def costs(self, starts: FloatArray, ends: FloatArray) -> FloatArray:
-        """Costs in metres, shape (n,), of the straight edges from `starts` to `ends`, both of shape (n, 2)."""
+        """Costs of straight edges.
+
+        Parameters
+        ----------
+        starts, ends : ndarray, shape (n, 2)
+            In metres.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            In metres: length, plus `hazard_m` times the hazard. What starting inside a zone costs is not
+            included (`hazards_at`).
+        """
         length = np.hypot(*(ends - starts).T)
         return np.asarray(length + self.hazard_m * self.hazards(starts, ends))
 
     @property
     def hazard_m(self) -> float:
-        """What a hazard of 1 counts, in metres: c_MAX a."""
+        """What a hazard of 1 costs, in metres: c_MAX a."""
         return self.c_max_m * self.a
 
     @cached_property
@@ -82,7 +95,19 @@ class Danger:
         return tuple(zone.area.boundary for zone in self.zones if zone.hazard > 0.0)
 
     def hazards(self, starts: FloatArray, ends: FloatArray) -> FloatArray:
-        """-log(1 - P) of straight edges, shape (n,); who starts inside a zone has entered it before."""
+        """Hazards of straight edges, -log(1 - P).
+
+        Parameters
+        ----------
+        starts, ends : ndarray, shape (n, 2)
+            In metres.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Summed over the zones. A zone counts once for each time that the edge enters it, or for each metre
+            inside. An edge that starts inside has entered before: that crossing is counted by `hazards_at`.
+        """
         total = np.zeros(len(starts))
         if not self.zones or not len(starts):
             return total
@@ -94,6 +119,7 @@ class Danger:
             if zone.per is Per.METRE:
                 total[met] += zone.hazard * shapely.length(inside)
             else:
+                # Each part of the edge inside is one entry, except the part that the edge starts in.
                 entered = shapely.get_num_geometries(inside) - _is_inside(core, starts[met])
                 total[met] += zone.hazard * np.maximum(entered, 0)
         return total
@@ -110,6 +136,7 @@ class Danger:
         """The probability of harm along a polyline, shape (n, 2): 1 - prod(1 - P_k) over its edges."""
         starts, ends = polyline[:-1], polyline[1:]
         hazard = self.hazards_at(starts[:1]).sum() + self.hazards(starts, ends).sum()
+        # expm1 keeps the digits of small hazards, which 1 - exp(-hazard) would lose.
         return -math.expm1(-hazard)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Routes among obstacles that come, move and go.
+"""Routes among obstacles that appear, move and disappear.
 
 M. Innocenti, L. Pollini and A. Bracci (2006), section 2.4.1, step b: at every time step the triangulation changes
 where obstacles moved, and nowhere else (`oxbow.geometry.route.retriangulation`).
@@ -64,11 +64,18 @@ class DynamicRouter:
 
     @property
     def obstacles(self) -> Mapping[str, Polygon]:
-        """The obstacles there are, by name."""
+        """The present obstacles, by name."""
         return MappingProxyType(self._obstacles)
 
     def put(self, name: str, area: Polygon) -> None:
         """Add an obstacle, or move the one of that name.
+
+        Parameters
+        ----------
+        name
+            The name to move or remove the obstacle by.
+        area
+            What the obstacle covers, in planar metres; it may reach beyond the water.
 
         Raises
         ------
@@ -95,7 +102,13 @@ class DynamicRouter:
         self._change(name, Polygon())
 
     def route(self, start: npt.ArrayLike, goal: npt.ArrayLike) -> Route:
-        """The route among the present obstacles; see `Router.route`."""
+        """The route among the present obstacles; see `Router.route`.
+
+        Parameters
+        ----------
+        start, goal : array_like, shape (2,)
+            (x, y) in metres.
+        """
         return self._router.route(start, goal)
 
     def table(self, points: npt.ArrayLike) -> RouteTable:
@@ -111,7 +124,7 @@ class DynamicRouter:
         return router_on(self.mesh, self._method, self._danger)
 
     def _change(self, name: str, area: Polygon) -> None:
-        """Replace what one obstacle covers; an empty area is no obstacle."""
+        """Replace the area that one obstacle covers; an empty area removes it."""
         obstacles = {other: polygon for other, polygon in self._obstacles.items() if other != name}
         changed = shapely.union(self._obstacles.get(name, Polygon()), area, grid_size=GRID_M)
         if not area.is_empty:
@@ -119,6 +132,7 @@ class DynamicRouter:
         mesh = retriangulated(self.mesh, changed, _Site(self._open_water, tuple(obstacles.values())))
         if not len(mesh.triangles):
             raise Infeasible("covers all the water that is left", where=name)
+        # Only now, so that a refusal leaves everything as it was. The router belongs to the mesh before.
         self._obstacles = obstacles
         self.mesh = mesh
         self.__dict__.pop("_router", None)

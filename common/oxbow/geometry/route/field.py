@@ -16,10 +16,10 @@ __all__ = ["lengths_from"]
 
 
 def lengths_from(water: Polygon | MultiPolygon, sources: FloatArray, places: FloatArray) -> FloatArray:
-    """Lengths of the shortest routes from some places to others, in metres, shape (k, n); inf where none leads.
+    """Lengths of the shortest routes from some places to others.
 
-    Only what sources and bends see is looked for, unlike in `Router.distances`, which asks of every two places
-    whether they see each other.
+    Only the lines of sight from sources and bends are computed, unlike in `Router.distances`, which needs them
+    between every two places.
 
     Parameters
     ----------
@@ -27,6 +27,11 @@ def lengths_from(water: Polygon | MultiPolygon, sources: FloatArray, places: Flo
         Where routes may run.
     sources, places : ndarray, shape (k, 2) and (n, 2)
         In the water, in metres; no route leads to a place outside.
+
+    Returns
+    -------
+    ndarray, shape (k, n)
+        In metres; inf where no route leads.
 
     Raises
     ------
@@ -43,6 +48,7 @@ def lengths_from(water: Polygon | MultiPolygon, sources: FloatArray, places: Flo
     at = bends.touches + Touches(first + ends.at.place, ends.at.triangle)
     nothing = np.zeros(len(mesh.tails), dtype=np.bool_)
     seen = sights(mesh, eyes, at, places, mesh.holding(places), nothing)
+    # The last bend or source of a shortest route sees the place itself: one straight step completes the route.
     onward_m = np.hypot(*(places[seen.places] - eyes[seen.place_eyes]).T)
     lengths_m = np.full((len(sources), len(places)), np.inf)
     for own_m, to_eyes_m in zip(lengths_m, ways.costs, strict=True):

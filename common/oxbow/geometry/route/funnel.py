@@ -19,8 +19,8 @@ __all__ = ["funnel_line"]
 def funnel_line(channel: Channel) -> FloatArray:
     """The shortest polyline inside a channel, shape (n, 2).
 
-    Two chains run from an apex to the ends of the last gate, bent inwards. A gate's end either shortens its own
-    chain or, where it has crossed the other chain, moves the apex along that.
+    Two chains run from an apex to the ends of the last gate, bent inwards. The next gate's end shortens its own
+    chain; where it crosses the other chain, the apex moves along that chain.
     """
     start: Place = tuple(channel.start.tolist())
     goal: Place = tuple(channel.goal.tolist())
@@ -35,6 +35,7 @@ def funnel_line(channel: Channel) -> FloatArray:
 
 def _extend(chain: deque[Place], other: deque[Place], end: Place, side: float, line: list[Place]) -> None:
     """Lengthen one chain to a new end; `side` is 1 for the right chain and -1 for the left one."""
+    # At 0 too: a point in line drops out, and so does an end that two successive gates share.
     while len(chain) > 1 and side * _turn(chain[-2], chain[-1], end) >= 0:
         chain.pop()
     if len(chain) == 1:

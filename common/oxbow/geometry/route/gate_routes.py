@@ -1,8 +1,8 @@
 """Routes through the water along the middle of its triangulation.
 
 The network is that of the gates between triangles (`oxbow.geometry.route.channel`): it is connected wherever the
-water is, however narrow, never touches the shore, and runs along the middle of narrow arms. A `Router` leads to a
-place; these routes lead to whatever place of an area is nearest, and keep to the middles of the gates.
+water is, however narrow, never touches the shore, and runs along the middle of narrow arms. The routes of a
+`Router` lead to a place; these lead to whatever place of an area is nearest, and keep to the middles of gates.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from oxbow.geometry.route.search import Arcs, WaysTo, cheapest_ways, cheapest_wa
 __all__ = ["Inward", "Routes", "taut"]
 
 TAUT_POINTS = 200
-"""Into how many steps a route is divided before it is pulled tight."""
+"""How many steps a route is divided into before it is pulled tight."""
 
 
 class Routes:
@@ -37,7 +37,7 @@ class Routes:
     water
         Where routes may run.
     detail_m
-        The shore is divided into edges no longer than this, so that gates stand about as close.
+        The shore is divided into edges no longer than this, so that gates are about as close together.
     """
 
     def __init__(self, water: Polygon | MultiPolygon, detail_m: float = math.inf) -> None:
@@ -68,12 +68,33 @@ class Routes:
         return STRtree(np.asarray(shapely.points(self._gates.places)))
 
     def goals_near(self, line: LineString, distance_m: float) -> Indices:
-        """The gates whose middles lie no farther from a line."""
+        """The gates whose middles lie near a line.
+
+        Parameters
+        ----------
+        line
+            In metres.
+        distance_m
+            The greatest distance of a middle from the line.
+
+        Returns
+        -------
+        ndarray of int
+            Numbers of sides, ascending; shores are not among them.
+        """
         near = np.sort(self._middles.query(line, predicate="dwithin", distance=distance_m))
         return np.asarray(near[self._gates.mesh.twins[near] >= 0])
 
     def into(self, area: BaseGeometry, goals: Indices) -> Inward:
-        """The shortest routes from everywhere into an area, for many at once; else as `to_area`."""
+        """The shortest routes into an area from anywhere in the water: one search serves all starts.
+
+        Parameters
+        ----------
+        area
+            Where to, in the water.
+        goals
+            The area's `goals_in`; where there are none, all routes lead to a point of the area instead.
+        """
         places = self._gates.places
         if len(goals):
             return Inward(places, cheapest_ways_to(self._graph, goals), self._gates_from)
@@ -92,7 +113,20 @@ class Routes:
     def to_area(self, start: FloatArray, area: BaseGeometry, goals: Indices) -> LineString | None:
         """The shortest route from a point of the water into an area; None if none leads there.
 
-        `goals` are the area's `goals_in`; an area too small to hold any is entered at a point of its own.
+        Parameters
+        ----------
+        start : ndarray, shape (2,)
+            In the water, in metres.
+        area
+            Where to, in the water.
+        goals
+            The area's `goals_in`. Without any, as in an area that is too small, the route ends at a point of the
+            area.
+
+        Raises
+        ------
+        Internal
+            The area has no goals, and no route leads to its point.
         """
         if len(goals) == 0:
             return LineString(self.between(start, shapely.get_coordinates(area.representative_point())[0]))
@@ -100,7 +134,23 @@ class Routes:
         return None if way is None else LineString(np.vstack([start, way]))
 
     def between(self, start: FloatArray, goal: FloatArray) -> FloatArray:
-        """The shortest route over middles of gates between two points of the water, shape (n, 2), with both."""
+        """The shortest route over the middles of gates between two points of the water.
+
+        Parameters
+        ----------
+        start, goal : ndarray, shape (2,)
+            In the water, in metres.
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            From start to goal, both included.
+
+        Raises
+        ------
+        Internal
+            No water leads from the one to the other.
+        """
         triangle = self._triangle_at(goal)
         if self._triangle_at(start) == triangle:
             return np.vstack([start, goal])
@@ -135,16 +185,16 @@ class Routes:
 
 
 class Inward:
-    """Routes from many places into one area, of which each ends where it comes upon one before it.
+    """Routes from many places into one area; each ends where it meets an earlier one.
 
     Parameters
     ----------
     places
-        Those of the network, shape (n, 2), in metres.
+        The places of the network, shape (n, 2), in metres.
     ways
         From each of them to the area.
     first
-        The numbers of the places that a straight step leads to from anywhere in the water.
+        From a place anywhere in the water, the numbers of the network's places that a straight step leads to.
     """
 
     def __init__(self, places: FloatArray, ways: WaysTo, first: Callable[[FloatArray], Indices]) -> None:
@@ -161,7 +211,7 @@ class Inward:
         start
             A place of the water.
         unused_m
-            How much of its beginning no later route may end on; by default, none ends on it at all.
+            How much of its beginning no later route may end on, in metres; by default, no route ends on it at all.
         """
         first = self._first(start)
         length_m = np.hypot(*(self._places[first] - start).T) + self._ways.costs[first]
@@ -176,10 +226,17 @@ class Inward:
 
 
 def taut(route: LineString, water: BaseGeometry) -> LineString:
-    """A route pulled tight: from each vertex straight on to the farthest one that the water lets see.
+    """A route pulled tight: from each vertex straight on to the farthest one in sight across the water.
 
-    Backward and forward, over points spread along the route, so that bends shrink to the corners of the shore.
+    Backward, then forward, over points spread along the route, so that bends shrink to the corners of the shore.
     Unlike a shortest route through that water, it may begin outside, and stays as it is where the water ends.
+
+    Parameters
+    ----------
+    route
+        In metres, of positive length.
+    water
+        What straight lines between vertices have to stay in.
     """
     for _ in range(2):
         points = shapely.get_coordinates(shapely.segmentize(route, route.length / TAUT_POINTS))[::-1]

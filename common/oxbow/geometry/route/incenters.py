@@ -2,13 +2,12 @@
 
 M. Innocenti, L. Pollini and A. Bracci (2006), section 2.4.2. The straight line between the incenters of adjacent
 triangles crosses the side between them, because the angles there are halves of angles below 180 degrees; so the
-polyline over incenters passes every gate between its ends. The report's reduction (steps a to d) takes points out
-of it where the straight line still passes all gates in between.
+polyline over incenters passes every gate between its ends. The report's reduction (steps a to d) removes points
+from it where the straight line still passes all gates in between.
 
-Departures: the report takes out what it can as it comes along, two points or one at a time, and is left with
-whatever incenters that spares, which may lie on the far side of wide water; here it is the shortest polyline that
-taking points out can lead to. And a line has to pass gates a little away from their ends, where the report lets it
-graze them.
+Departures: the report removes points greedily, one or two at a time, and is left with whatever incenters that
+spares, which may lie on the far side of wide water. This module finds the shortest polyline that removing points
+can lead to. And a line has to pass gates a little away from their ends, where the report lets it graze them.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ MARGIN = 0.02
 """A line passes gates this share of their width away from their ends."""
 
 GATES_AHEAD = 32
-"""Straight lines through channels hardly ever pass more gates: only for those that do, all gates are looked at."""
+"""Straight lines through channels hardly ever pass more gates: all gates are examined only for those that do."""
 
 
 def incenter_line(channel: Channel) -> FloatArray:
@@ -49,7 +48,7 @@ def incenter_line(channel: Channel) -> FloatArray:
 
 
 def _in_line(here: int, points: FloatArray, triangle: Indices, channel: Channel) -> Indices:
-    """The points ahead that a straight line leads to through all gates in between; the next one always counts."""
+    """The points ahead that a straight line reaches through all gates in between; the next one always counts."""
     first, last = triangle[here], len(channel.left)
     for gates in (GATES_AHEAD, last):
         window = slice(first, min(first + gates, last))
@@ -63,7 +62,7 @@ def _in_line(here: int, points: FloatArray, triangle: Indices, channel: Channel)
 
 
 def _passing(towards: FloatArray, gates: Indices, left: FloatArray, right: FloatArray) -> tuple[Mask, bool]:
-    """Which directions, shape (n, 2), pass so many gates, and whether none passes them all."""
+    """Which directions, shape (n, 2), pass the first `gates` gates, and whether nothing can pass them all."""
     if not len(left):
         return np.ones(len(towards), dtype=np.bool_), False
     axis = (left[0] + right[0]) / 2
@@ -72,6 +71,7 @@ def _passing(towards: FloatArray, gates: Indices, left: FloatArray, right: Float
     open_to = np.minimum.accumulate(_direction_rad(left + margin, axis))
     open_from = np.maximum.accumulate(_direction_rad(right - margin, axis))
     direction = _direction_rad(towards, axis)
+    # A point in the same triangle passes no gate: the limits at its index -1 are overruled below.
     passes = (direction < open_to[gates - 1]) & (direction > open_from[gates - 1])
     return np.asarray(passes | (gates == 0)), bool(open_to[-1] <= open_from[-1])
 

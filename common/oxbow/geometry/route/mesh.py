@@ -1,4 +1,4 @@
-"""Triangulated water: which triangles lie side by side, where places are, how far the shore is."""
+"""Triangulated water: which triangles are neighbours, which one holds a place, how far the shore is."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from oxbow.tolerances import ROUNDING_M
 __all__ = ["Mesh", "Touches"]
 
 TOUCH_M = 1e-9
-"""A place this near to a triangle touches it."""
+"""A place this close to a triangle touches it."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Touches:
         return Touches(np.concatenate([self.place, other.place]), np.concatenate([self.triangle, other.triangle]))
 
     def among(self, places: Indices) -> Touches:
-        """What some distinct places touch, numbered in their order."""
+        """The triangles that some distinct places touch; the places are numbered anew, in the order given."""
         rank = np.full(max(self.place.max(initial=0), places.max(initial=0)) + 1, -1)
         rank[places] = np.arange(len(places))
         chosen = rank[self.place] >= 0
@@ -48,6 +48,7 @@ class Touches:
 
     def companions(self) -> tuple[Indices, Indices]:
         """Ordered pairs of places that touch the same triangle; a pair may occur repeatedly."""
+        # Sorted by triangle, companions are a few rows apart: at most as many as the fullest triangle has places.
         order = np.argsort(self.triangle, kind="stable")
         place, triangle = self.place[order], self.triangle[order]
         first, second = [place[:0]], [place[:0]]
@@ -62,7 +63,7 @@ class Touches:
 class Mesh:
     """A constrained Delaunay triangulation of water, as sides of triangles.
 
-    Side s = 3 t + j of triangle t (`oxbow.geometry.triangles`) is spoken of as corner s where its tail is meant.
+    Side s = 3 t + j of triangle t (`oxbow.geometry.triangles`) is called corner s where its tail is meant.
 
     Parameters
     ----------
@@ -84,7 +85,15 @@ class Mesh:
     ) -> Mesh:
         """Triangulate water; no triangle straddles the shore or one of the outlines.
 
-        Shores and outlines are divided into sides no longer than `detail_m`.
+        Parameters
+        ----------
+        water
+            Valid, in planar metres; parts may lie apart.
+        outlines
+            Lines that sides of triangles run along, such as those of danger zones.
+        detail_m
+            Sides along the shore and the outlines are no longer than this; by default, as long as the given
+            edges.
 
         Raises
         ------
@@ -138,9 +147,9 @@ class Mesh:
 
     @cached_property
     def sectors(self) -> Indices:
-        """Corners that are one place of the water have one number, shape (3 m,).
+        """The number of each corner's place in the water, shape (3 m,).
 
-        A vertex at which shores touch is several places: one for each part of the water round it.
+        A vertex at which shores touch is several places: one for each part of the water around it.
         """
         sides, count = np.flatnonzero(self.twins >= 0), len(self.twins)
         same = coo_array((np.ones(len(sides)), (sides, following(self.twins[sides]))), shape=(count, count))
@@ -164,7 +173,18 @@ class Mesh:
         return float(distance_m[0])
 
     def is_clear(self, starts: FloatArray, ends: FloatArray) -> Mask:
-        """Whether straight lines between places, both of shape (n, 2), meet no shore; shape (n,)."""
+        """Whether straight lines between places meet no shore.
+
+        Parameters
+        ----------
+        starts, ends : ndarray, shape (n, 2)
+            In metres. A line that ends on the shore meets it.
+
+        Returns
+        -------
+        ndarray of bool, shape (n,)
+            True where the line meets no shore.
+        """
         lines = np.asarray(shapely.linestrings(np.stack([starts, ends], axis=1)))
         clear = np.ones(len(lines), dtype=np.bool_)
         clear[self._shore_index.query(lines, predicate="intersects")[0]] = False
@@ -201,6 +221,7 @@ class Mesh:
         touches = self.holding(places)
         for number in sorted(set(range(len(places))) - set(touches.place.tolist())):
             nearest, distance_m = self._index.query_nearest(Point(places[number]), return_distance=True)
+            # A place on a slanted shore may be rounded to land: it touches the nearest triangles.
             if distance_m[0] > ROUNDING_M:
                 raise Infeasible(
                     f"at {_text(places[number])} lies outside the water, {distance_m[0]:.3g} m from it;"
@@ -212,7 +233,7 @@ class Mesh:
 
 
 def _parted(water: Polygon | MultiPolygon, outlines: Sequence[BaseGeometry]) -> Geometries:
-    """The parts into which lines cut a region; neighbours have the vertices of their common border in common."""
+    """The parts into which lines cut a region; neighbours share the vertices of their common border."""
     lines = shapely.get_parts(shapely.node(shapely.geometrycollections([water.boundary, *outlines])))
     faces = shapely.get_parts(shapely.polygonize(lines))
     shapely.prepare(water)

@@ -27,7 +27,7 @@ def make_router(method: RouteMethod, water: Polygon | MultiPolygon, danger: Dang
     water
         Where they may run, in planar metres; holes are islands. Parts of it may lie apart.
     danger
-        Zones that may be travelled at a risk, and what one vehicle makes of them.
+        Zones that may be travelled at a risk, and how much they count for one vehicle.
 
     Raises
     ------
@@ -38,7 +38,17 @@ def make_router(method: RouteMethod, water: Polygon | MultiPolygon, danger: Dang
 
 
 def router_on(mesh: Mesh, method: RouteMethod, danger: Danger) -> Router:
-    """The router of one method on triangulated water."""
+    """The router of one method on triangulated water.
+
+    Parameters
+    ----------
+    mesh
+        The water. For exact costs, the outlines of danger zones are among its sides.
+    method
+        How routes are found.
+    danger
+        Zones that may be travelled at a risk, and how much they count for one vehicle.
+    """
     match method:
         case RouteMethod.VISIBILITY:
             return NetworkRouter(VisibilityGraph(mesh, danger), method)

@@ -1,6 +1,6 @@
-"""Routes over a network of places: the network is made once, start and goal are put in for each question.
+"""Routes over a network of places: the network is built once; start and goal are inserted for each query.
 
-What the places are, and what line is drawn over the places found, is the matter of each method.
+Each method decides what the places are, and what line is drawn over the places found.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Ends:
 
 @dataclass(frozen=True)
 class Links:
-    """How ends of ways hang together with a network; pairs may occur repeatedly.
+    """How ends of ways are connected to a network; pairs may occur repeatedly.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Network(Protocol):
 
     @property
     def danger(self) -> Danger:
-        """What danger there is."""
+        """The danger zones, as they count for one vehicle."""
 
     @property
     def places(self) -> FloatArray:
@@ -70,7 +70,7 @@ class Network(Protocol):
         """How they are joined."""
 
     def links(self, ends: Ends) -> Links:
-        """How ends of ways hang together with the network."""
+        """How ends of ways are connected to the network."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,20 @@ class NetworkRouter:
         self.drawn = drawn
 
     def route(self, start: npt.ArrayLike, goal: npt.ArrayLike) -> Route:
-        """The route over the cheapest way; see `Router.route`."""
+        """The route over the cheapest way; see `Router.route`.
+
+        Parameters
+        ----------
+        start, goal : array_like, shape (2,)
+            (x, y) in metres.
+
+        Raises
+        ------
+        InvalidMission
+            One of them is not one place, or is not finite.
+        Infeasible
+            Start or goal lies outside the water (`where` says which), or no water leads from one to the other.
+        """
         ends = _checked_ends(start, goal)
         found = self._found(ends, ["start", "goal"], starts=1)
         _require_way(found.costs[0, 1], ends)
@@ -150,14 +163,16 @@ class NetworkRouter:
         """Costs and lengths of the routes from each point to the others; inf where none is known."""
         if self.drawn is not None:
             return self._line_figures(found)
+        # Without danger, costs are lengths, and no way has to be retraced.
         return found.costs, found.lengths_m if self.network.danger.outlines else found.costs
 
     def _found(self, points: FloatArray, names: Sequence[str], *, starts: int) -> _Found:
-        """Search the network, with the points put in to arrive at, from the first of them."""
+        """Search the network with the points inserted, from the first `starts` of them to all."""
         network = self.network
         ends = Ends(points, network.mesh.touches(points, names))
         links = network.links(ends)
         departure = len(network.places)
+        # Each point is inserted twice, to depart from and to arrive at: no way can lead through a third point.
         arrival = departure + len(points)
         places = np.vstack([network.places, points, points])
         arcs = network.arcs
@@ -178,6 +193,7 @@ class NetworkRouter:
 
     def _line_figures(self, found: _Found) -> tuple[FloatArray, FloatArray]:
         """Costs and lengths of the routes drawn from each point to those after it; inf where there is none."""
+        # The other half stays inf, so that `table` takes the same drawn line both ways.
         costs, lengths_m = np.full((2, *found.costs.shape), np.inf)
         first, last = np.nonzero(np.triu(np.isfinite(found.costs), 1))
         lines = [self._line(found, i, j) for i, j in zip(first.tolist(), last.tolist(), strict=True)]
@@ -191,7 +207,7 @@ class NetworkRouter:
 
 @dataclass(frozen=True)
 class _Found:
-    """What a search between ends found over places; to arrive at them is numbered from `arrival`."""
+    """The result of a search between ends: `arrival` is the number of the first place of arrival."""
 
     ends: Ends
     places: FloatArray
@@ -208,6 +224,7 @@ class _Found:
         """Lengths of the ways from the first ends to all; inf where there is none."""
         here = np.tile(np.arange(self.arrival, len(self.places)), (len(self.costs), 1))
         source = np.arange(len(here))[:, None]
+        # All ways are retraced together, one step per turn; those at their source stand still.
         lengths_m = np.zeros(here.shape)
         while ((before := self.ways.previous[source, here]) >= 0).any():
             before = np.where(before >= 0, before, here)

@@ -1,9 +1,9 @@
 """Local changes of a triangulation.
 
 M. Kallmann, H. Bieri and D. Thalmann (2003), *Fully dynamic constrained Delaunay triangulations*: only triangles
-that a change affects are made anew. They insert vertices and edges one by one; here the triangles that meet the
-change are taken out as one cavity, GEOS triangulates it, and from its border C. L. Lawson's flips (1977) go on
-outwards until all is constrained Delaunay again.
+that a change affects are rebuilt. They insert vertices and edges one by one; this module removes the triangles
+that meet the change as one cavity, lets GEOS triangulate it, and from its border C. L. Lawson's flips (1977) go
+on outwards until everything is constrained Delaunay again.
 """
 
 from __future__ import annotations
@@ -25,14 +25,15 @@ from oxbow.tolerances import ROUNDING_M
 __all__ = ["GRID_M", "Site", "retriangulated"]
 
 GRID_M = 2.0**-20
-"""All vertices lie on a grid this fine (about 1 micrometre), so that what is cut out fits again when put back."""
+"""All vertices lie on a grid this fine (about 1 micrometre), so that a part cut out fits again when put back."""
 
 DELAUNAY_SLACK = 1e-12
-"""How far from one circle four vertices must be for a flip, as the sine of an angle."""
+"""How far from one circle four vertices must be for a flip, as the sine of an angle. Without it, rounding could
+make both diagonals of four vertices on one circle look wrong, and flip them for ever."""
 
 
 class Site(Protocol):
-    """What the water is to be after a change."""
+    """The water as it should be after a change."""
 
     def shores_near(self, areas: Geometries) -> Geometries:
         """All lines along which water may end that come within rounding of areas; some may run over land."""
@@ -49,7 +50,7 @@ def retriangulated(mesh: Mesh, changed: BaseGeometry, site: Site) -> Mesh:
     mesh
         The water before, on the grid.
     changed
-        Where water has come or gone; on the grid.
+        Where water has appeared or disappeared; on the grid.
     site
         The water afterwards, which differs only there.
     """
@@ -66,8 +67,8 @@ def retriangulated(mesh: Mesh, changed: BaseGeometry, site: Site) -> Mesh:
 def _hole(mesh: Mesh, cavity: Indices, changed: BaseGeometry, site: Site) -> Geometries:
     """The water of a cavity after the change, as polygons.
 
-    All lines are noded together, the shores as they were given and not as earlier changes cut them: what
-    rounding did to a shore is undone with the obstacle that was there.
+    All lines are noded together, with the shores as they were given, not as earlier changes cut them: what
+    rounding did to a shore is undone when the obstacle that was there leaves.
     """
     pieces = np.asarray(shapely.polygons(mesh.corners[cavity]))
     border = mesh.twins.reshape(-1, 3)[cavity].ravel()
@@ -120,6 +121,7 @@ def _spliced(mesh: Mesh, cavity: Indices, faces: Geometries) -> tuple[_Splice, I
 def _numbered(mesh: Mesh, cavity: Indices, places: FloatArray) -> tuple[FloatArray, Indices]:
     """All vertices, and the numbers of places among them: those that the cavity had keep theirs."""
     old = np.unique(mesh.triangles[cavity])
+    # Exact comparison is safe: old and new vertices lie on one grid.
     number = {place: int(vertex) for place, vertex in zip(map(tuple, mesh.points[old].tolist()), old, strict=True)}
     new = [place for place in map(tuple, places.tolist()) if place not in number]
     number |= {place: len(mesh.points) + rank for rank, place in enumerate(new)}
@@ -166,7 +168,7 @@ class _Splice:
         return sine >= -DELAUNAY_SLACK
 
     def _flip(self, side: int, twin: int) -> list[int]:
-        """Exchange the diagonal of two triangles' quadrangle; the four sides round it."""
+        """Exchange the diagonal of two triangles' quadrangle; return the four sides around it."""
         (t, j), (u, k) = divmod(side, 3), divmod(twin, 3)
         a, b, c = self.triangles[t, [j, j - 2, j - 1]].tolist()
         d = int(self.triangles[u, k - 1])

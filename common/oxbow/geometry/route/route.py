@@ -1,4 +1,4 @@
-"""What a route is, and what every method of finding one offers."""
+"""What a route is, and what every method of finding routes offers."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Route:
     length_m
         Its length.
     cost
-        In metres: the length, and what the danger on the way is worth (`Danger.costs` over its edges).
+        In metres: the length, plus the cost of the danger on the way (`Danger.costs` over its edges).
     danger
         The probability of harm on the way, 1 - prod(1 - P_k) over its edges.
     clearance_m
@@ -68,7 +68,7 @@ class RouteTable:
     Parameters
     ----------
     costs, lengths_m : ndarray, shape (n, n)
-        Of the cheapest routes: in metres, with what danger is worth and without. Symmetric, 0 on the diagonal, inf
+        Of the cheapest routes: in metres, with and without the cost of danger. Symmetric, 0 on the diagonal, inf
         where no water leads from one place to the other.
     polyline
         The route from one place to another, by their numbers, shape (k, 2).
@@ -83,7 +83,12 @@ class Router(Protocol):
     """Finds routes through one water."""
 
     def route(self, start: npt.ArrayLike, goal: npt.ArrayLike) -> Route:
-        """The route from one place to another, both (x, y) in metres.
+        """The cheapest route that the method finds from one place to another.
+
+        Parameters
+        ----------
+        start, goal : array_like, shape (2,)
+            (x, y) in metres.
 
         Raises
         ------
@@ -92,7 +97,7 @@ class Router(Protocol):
         """
 
     def table(self, points: npt.ArrayLike) -> RouteTable:
-        """The routes between all pairs of places, shape (n, 2), in metres.
+        """The routes between all pairs of places, given as an array of shape (n, 2), in metres.
 
         Raises
         ------
@@ -121,7 +126,19 @@ class Router(Protocol):
 
 
 def judged(polyline: FloatArray, mesh: Mesh, danger: Danger, method: RouteMethod) -> Route:
-    """The route along a polyline, with its figures."""
+    """The route along a polyline, with its length, cost, danger and clearance.
+
+    Parameters
+    ----------
+    polyline : ndarray, shape (n, 2)
+        In the water, from start to goal, in metres. Of equal neighbours one is kept.
+    mesh
+        The water.
+    danger
+        What danger there is.
+    method
+        How the polyline was found.
+    """
     polyline = _without_repeats(polyline)
     starts, ends = polyline[:-1], polyline[1:]
     at_start = danger.hazards_at(polyline[:1]).sum()

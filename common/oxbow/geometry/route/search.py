@@ -25,18 +25,40 @@ class Arcs:
 
     @classmethod
     def one_way(cls, places: FloatArray, tails: Indices, heads: Indices, danger: Danger) -> Arcs:
-        """Straight edges between places, shape (n, 2)."""
+        """Straight edges between places.
+
+        Parameters
+        ----------
+        places : ndarray, shape (n, 2)
+            In metres.
+        tails, heads : ndarray of int, shape (m,)
+            Numbers of the places where each edge begins and ends; no pair twice.
+        danger
+            What makes an edge cost more than its length.
+        """
         return cls(tails, heads, danger.costs(places[tails], places[heads]))
 
     @classmethod
     def both_ways(cls, places: FloatArray, pairs: Indices, danger: Danger) -> Arcs:
-        """Straight edges between pairs of places, shape (m, 2), there and back; a pair may occur repeatedly."""
+        """Straight edges between pairs of places, there and back.
+
+        Parameters
+        ----------
+        places : ndarray, shape (n, 2)
+            In metres.
+        pairs : ndarray of int, shape (m, 2)
+            Numbers of the places that an edge joins. A pair may occur repeatedly and either way round; a pair of
+            one place is left out.
+        danger
+            What makes an edge cost more than its length.
+        """
         low, high = distinct(pairs.min(axis=1), pairs.max(axis=1))
         low, high = low[low < high], high[low < high]
         return cls.one_way(places, np.concatenate([low, high]), np.concatenate([high, low]), danger)
 
     def graph(self, count: int) -> csr_array[np.float64]:
         """The graph over `count` places."""
+        # A pair that occurred twice would have its costs added up: hence each pair at most once.
         return coo_array((self.costs, (self.tails, self.heads)), shape=(count, count)).tocsr()
 
     def __add__(self, other: Arcs) -> Arcs:
@@ -55,7 +77,20 @@ class Ways:
     previous: Indices
 
     def way(self, source: int, place: int) -> list[int]:
-        """The places on the way from a source, by its rank among the sources, to a place; both included."""
+        """The places on the way from a source to a place.
+
+        Parameters
+        ----------
+        source
+            The source's rank among the sources of the search.
+        place
+            The number of the place to arrive at.
+
+        Returns
+        -------
+        list of int
+            From the source to the place, both included; the place alone where none leads there.
+        """
         return list(self._backwards(source, place))[::-1]
 
     def _backwards(self, source: int, place: int) -> Iterator[int]:
@@ -65,7 +100,20 @@ class Ways:
 
 
 def cheapest_ways(graph: csr_array[np.float64], sources: Indices) -> Ways:
-    """Search a graph (`Arcs.graph`) from some of its places."""
+    """Search a graph from some of its places.
+
+    Parameters
+    ----------
+    graph
+        `Arcs.graph`.
+    sources : ndarray of int, shape (k,)
+        Numbers of the places to start from.
+
+    Returns
+    -------
+    Ways
+        Costs and last steps, each of shape (k, n).
+    """
     costs, previous = dijkstra(graph, indices=sources, return_predecessors=True)
     return Ways(costs, previous.astype(np.intp))
 
@@ -86,13 +134,37 @@ class WaysTo:
 
 
 def cheapest_ways_to(graph: csr_array[np.float64], goals: Indices) -> WaysTo:
-    """Search a graph (`Arcs.graph`) backwards, from some of its places to all: once, however many set out."""
+    """Search a graph backwards, from its goals to all places: once, however many set out.
+
+    Parameters
+    ----------
+    graph
+        `Arcs.graph`.
+    goals : ndarray of int, shape (k,)
+        Numbers of the places of which the nearest counts.
+
+    Returns
+    -------
+    WaysTo
+        Costs and next steps, each of shape (n,).
+    """
     costs, following, _ = dijkstra(graph.T.tocsr(), indices=goals, min_only=True, return_predecessors=True)
     return WaysTo(costs, following.astype(np.intp))
 
 
 def distinct(tails: Indices, heads: Indices) -> tuple[Indices, Indices]:
-    """Pairs, each once."""
+    """Pairs of numbers, each once.
+
+    Parameters
+    ----------
+    tails, heads : ndarray of int, shape (m,)
+        Not negative.
+
+    Returns
+    -------
+    tails, heads : ndarray of int, shape (k,)
+        In ascending order, by tail first. A pair and its reverse are two.
+    """
     width = int(heads.max(initial=0)) + 1
     tails, heads = np.divmod(np.unique(tails * width + heads), width)
     return tails, heads

@@ -1,8 +1,8 @@
-"""Who sees whom across the water, by triangular expansion.
+"""Lines of sight across the water, by triangular expansion.
 
 F. Bungiu, M. Hemmer, J. Hershberger, K. Huang and A. Kroeller (2014), *Efficient computation of visibility
-polygons*: a cone of view enters a triangle through one side, is parted by the opposite corner, and leaves through
-the other two sides. Here the cones of all eyes advance together, one triangle a step, as arrays.
+polygons*: a cone of view enters a triangle through one side, is split by the opposite corner, and leaves through
+the other two sides. In this module the cones of all eyes advance together, one triangle per step, as arrays.
 """
 
 from __future__ import annotations
@@ -53,13 +53,13 @@ def sights(mesh: Mesh, eyes: FloatArray, at: Touches, places: FloatArray, sought
     mesh
         The water.
     eyes : ndarray, shape (k, 2)
-        Where from.
+        Where they are, in metres.
     at
         The triangles that the eyes look out of.
     places : ndarray, shape (p, 2)
-        What is looked for beside corners.
+        What is sought besides corners, in metres.
     sought
-        The triangles that those touch.
+        The triangles that these places touch.
     wanted : ndarray of bool, shape (3 n,)
         The corners that count.
 
@@ -98,7 +98,7 @@ def _first_cones(mesh: Mesh, eyes: FloatArray, at: Touches) -> _Cones:
 
 
 def _parted(mesh: Mesh, cones: _Cones, apex: FloatArray) -> _Cones:
-    """The cones beyond the triangles entered; they part at the corner opposite, `apex` as seen from the eye."""
+    """The cones beyond the triangles entered; they split at the opposite corner, `apex` as seen from the eye."""
     to_right, to_left = following(cones.side), following(following(cones.side))
     below_left, above_right = _is_left(cones.left, of=apex), _is_left(apex, of=cones.right)
     pass_right = above_right & (mesh.twins[to_right] >= 0)

@@ -32,10 +32,10 @@ from oxbow.tolerances import ROUNDING_M
 __all__ = ["RINGS", "Tessellation", "lattice"]
 
 SIDES_ACROSS = 60
-"""How many sides of the lattice fit the longer side of the water's box, where nothing else is asked for."""
+"""How many sides of the lattice fit the longer side of the water's bounding box, by default."""
 
 MOST_SIDES_ACROSS = 1_000
-"""How many may be asked for: the lattice fills the box."""
+"""The most that may be requested: memory grows with the square, since the lattice fills the box."""
 
 RINGS = (
     ((1, 0), (0, 1), (-1, 1)),
@@ -62,7 +62,7 @@ def lattice(
     low, high : ndarray, shape (2,)
         Opposite corners of the rectangle, in metres.
     side_m
-        Of the triangles.
+        Length of the triangles' sides.
     rings
         Which neighbours are joined.
 
@@ -95,7 +95,7 @@ class Tessellation:
     danger
         What danger there is.
     side_m
-        Of the lattice's triangles; by default a sixtieth of the longer side of the water's box.
+        Side of the lattice's triangles; by default a sixtieth of the longer side of the water's box.
 
     Raises
     ------
@@ -123,7 +123,7 @@ class Tessellation:
         vertices, sectors = self.mesh.sector_places, self.mesh.sectors
         along_sides = np.column_stack([sectors, sectors[following(np.arange(len(sectors)))]])
         vertex, near = self._near(vertices)
-        # Where shores touch, a line that ends there does not tell from which side.
+        # Where shores touch, a line that ends there could arrive from either side.
         alone = KDTree(vertices).query_ball_point(vertices, ROUNDING_M, return_length=True) == 1
         links = np.column_stack([vertex, near])[alone[vertex]]
         pairs = np.vstack([along_sides, links, len(vertices) + self._lattice.pairs])
@@ -173,7 +173,7 @@ class Tessellation:
         return Touches(sectors, np.arange(len(sectors)) // 3) + on_lattice
 
     def _near(self, points: FloatArray) -> tuple[Indices, Indices]:
-        """Pairs of a point and a place of the lattice near it with no shore between, but for one at the point."""
+        """Pairs of a point and a place of the lattice near it with no shore between, except at the point."""
         near = KDTree(points).sparse_distance_matrix(self._index, REACH * self.side_m, output_type="ndarray")
         owner, place = near["i"], near["j"]
         from_lattice = self._lattice.places[place]
@@ -183,7 +183,7 @@ class Tessellation:
 
 @dataclass(frozen=True)
 class _Lattice:
-    """Places of the lattice in the water, the triangles that they touch, and pairs that no shore parts."""
+    """Places of the lattice in the water, the triangles that they touch, and pairs with no shore between."""
 
     places: FloatArray
     touches: Touches

@@ -30,7 +30,8 @@ STRAIGHT_RAD = math.pi - 1e-9
 
 
 EYES = 2**14
-"""So many bends look about at once: along straight channels all see so many that it takes memory."""
+"""How many bends are processed at once: along straight channels each sees so many others that all at once would
+take too much memory."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class VisibilityGraph:
         return Arcs.both_ways(self.places, np.vstack([np.empty((0, 2), dtype=np.intp), *pairs]), self.danger)
 
     def _pairs(self, first: int, last: int) -> Indices:
-        """Pairs of one of some bends and a bend that it sees, from and to which a route can lead, shape (n, 2)."""
+        """Pairs of one of some bends and a bend that it sees, where a route can run between them, shape (n, 2)."""
         bends, nobody = self.bends, np.empty(0, dtype=np.intp)
         at, wanted = bends.touches, bends.at_corner >= 0
         looks = (at.place >= first) & (at.place < last)
@@ -79,7 +80,7 @@ class VisibilityGraph:
         return np.column_stack([a, b])[useful]
 
     def links(self, ends: Ends) -> Links:
-        """See `Network.links`: what ends see.
+        """See `Network.links`: the bends and the other ends that each end sees.
 
         A place where shores touch is in the water of both sides, but no way leads through it.
         """
@@ -114,7 +115,15 @@ class Bends:
 
     @classmethod
     def of(cls, mesh: Mesh, *, any_turn: bool) -> Bends:
-        """The bends of a mesh; with `any_turn`, routes need not be taut at them."""
+        """The bends of a mesh: its corners of half a turn or more.
+
+        Parameters
+        ----------
+        mesh
+            The water.
+        any_turn
+            Whether routes may turn at a bend without being taut there, as danger zones make them.
+        """
         wide = mesh.angles >= STRAIGHT_RAD
         rank = np.where(wide, np.cumsum(wide) - 1, -1)
         at_corner = rank[mesh.sectors]
@@ -133,9 +142,23 @@ class Bends:
         return Touches(self.at_corner[self.corners], self.corners // 3)
 
     def can_be_reached(self, starts: FloatArray, bends: Indices) -> Mask:
-        """Whether straight lines from `starts`, shape (n, 2), touch the shore at bends without leading into it."""
+        """Whether straight lines touch the shore at bends without leading into it.
+
+        Parameters
+        ----------
+        starts : ndarray, shape (n, 2)
+            In metres.
+        bends : ndarray of int, shape (n,)
+            The bend that each line leads to.
+
+        Returns
+        -------
+        ndarray of bool, shape (n,)
+            True everywhere at bends where routes may take any turn.
+        """
         ahead = self.places[bends] - starts
         sides = [_side(ahead, shore[bends] - self.places[bends]) for shore in (self.before, self.after)]
+        # Both neighbours on one side: the line touches the shore. On either side: it leads into it.
         return np.asarray(sides[0] * sides[1] >= 0)
 
 
