@@ -84,6 +84,11 @@ def erode_water(
     tolerance_m
         Half width of the first strips; by default `default_tolerance_m`, or coarser for very long contours.
 
+    Returns
+    -------
+    Eroded
+        Without parts where the safety distance leaves nothing.
+
     Raises
     ------
     Internal

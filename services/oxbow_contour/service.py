@@ -146,7 +146,7 @@ def _require_breadth(parts: Sequence[Polygon], home: Polygon, request: ContourRe
 
 
 def _other_waters(waters: Sequence[Polygon], home: Polygon, request: ContourRequest) -> Iterator[DroppedPart]:
-    """The waters that are not planned on, but for what is too small to matter."""
+    """The waters that are not planned on, except for what is too small to matter."""
     for part in waters:
         if part is not home and is_basin(part, request.safety_m, request.least_width_m):
             yield _dropped(part, OTHER_WATER)

@@ -53,6 +53,11 @@ def simplify(water: Sequence[Polygon], tolerance_m: float) -> Simplified:
         Valid polygons with disjoint interiors, in metres.
     tolerance_m
         Half width of the strips: no point of a contour is farther than this from the edge that stands for it.
+
+    Returns
+    -------
+    Simplified
+        Valid parts, one for each polygon.
     """
     rings = rings_of(shapely.remove_repeated_points(np.array(water, dtype=object)))
     sizes = np.array([len(ring) for ring in rings])

@@ -64,6 +64,11 @@ def deviations(points: FloatArray, first: Indices, last: Indices) -> FloatArray:
         Vertices of a contour, in metres.
     first, last : arrays of int, shape (m,)
         The ends of each strip: strip i stands for points first[i] to last[i].
+
+    Returns
+    -------
+    array of shape (m,)
+        In metres.
     """
     counts = last - first
     strip = np.repeat(np.arange(len(first)), counts)

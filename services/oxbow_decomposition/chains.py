@@ -60,15 +60,18 @@ class Chain:
     columns: FloatArray
 
     def mark(self, index: int) -> Mark:
+        """The mark at one of the chain's vertices."""
         u, v = self.points[index].tolist()
         return Mark(float(self.columns[index]), u, v, index)
 
     @property
     def first(self) -> Mark:
+        """Where the chain begins: its least u."""
         return self.mark(0)
 
     @property
     def last(self) -> Mark:
+        """Where the chain ends: its greatest u."""
         return self.mark(len(self.points) - 1)
 
     def cut_below(self, vertex: Mark) -> Mark:

@@ -26,6 +26,11 @@ def handle(request: DecomposeRequest, show: Show) -> Decomposition:
         The free space, the spacing that the plan will have, and a heading if it is to be that one.
     show
         Receives the layers `scores`, `cells`, `critical_points` and `reeb`.
+
+    Returns
+    -------
+    Decomposition
+        The cells, with the scores of all headings where one was chosen.
     """
     scores: tuple[HeadingScore, ...] = ()
     heading_rad = request.heading_rad

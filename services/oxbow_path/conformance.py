@@ -12,7 +12,7 @@ __all__ = ["require_conforming"]
 
 
 def require_conforming(path: LineString, request: PathRequest) -> None:
-    """Check that a path is simple, no longer than allowed, and inside the free space but for its legs.
+    """Check that a path is simple, no longer than allowed, and inside the free space except for its legs.
 
     Parameters
     ----------

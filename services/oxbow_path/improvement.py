@@ -21,7 +21,7 @@ def improved(path: Polyline, task: Task, display: Display) -> LineString:
     Parameters
     ----------
     path
-        Simple, and inside the free space but for its legs.
+        Simple, and inside the free space except for its legs.
     task
         The water, its samples, and the length that there is.
     display

@@ -139,7 +139,7 @@ class MethodPlan:
     Attributes
     ----------
     path
-        Simple, and inside the free space but for its legs.
+        Simple, and inside the free space except for its legs.
     spacing_m
         The spacing of its parallel legs, or about that of neighbouring ones.
     reach_m

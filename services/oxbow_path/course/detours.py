@@ -54,7 +54,7 @@ def with_detours(path: LineString, waters: Waters, most_m: float, *, reach_m: fl
     Parameters
     ----------
     path
-        Simple, and inside the free space but for its legs.
+        Simple, and inside the free space except for its legs.
     waters
         The water and its probe.
     most_m
@@ -118,7 +118,7 @@ def detoured(path: LineString, waters: Waters, gap: FloatArray, left_m: float) -
     Parameters
     ----------
     path
-        Simple, and inside the free space but for its legs.
+        Simple, and inside the free space except for its legs.
     waters
         The water and its routes.
     gap

@@ -63,6 +63,11 @@ def best_plan(method: PathMethod, task: Task, display: Display) -> MethodPlan:
     display
         Shows what is tried.
 
+    Returns
+    -------
+    MethodPlan
+        The one of least `_score_m` of those tried, perhaps with detours to water that it left far away.
+
     Raises
     ------
     Infeasible

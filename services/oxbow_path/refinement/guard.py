@@ -55,8 +55,8 @@ class _Known:
 class Guard:
     """Keeps a path inside the free space, apart from itself.
 
-    Every state that it lets through is one that it has checked as a whole, or the one before: so a path that was
-    inside and simple stays both, whatever moves are asked for.
+    Every path that it returns is one that it has checked, or the one that it was given. So a path that was inside
+    and simple stays both, whatever moves are asked for.
     """
 
     free: BaseGeometry
@@ -76,7 +76,7 @@ class Guard:
         free
             The free space.
         path
-            A simple path inside it, but for its legs.
+            A simple path inside it, except for its legs.
         spacing_m
             The nominal spacing, which scales clearance and look-ups.
         """
@@ -125,7 +125,7 @@ class Guard:
         fault[afloat] = self._inside.leaving(path, afloat, known.clear_m)
         pairs = known.pairs if suspect is None else known.pairs[:, suspect[known.pairs].any(axis=0)]
         near, meets = nearer(path, pairs, self.clearance_m, self.touching_m)
-        # Neighbours but one, and legs, which begin side by side, may come near, but not meet.
+        # Segments two apart along the path, and legs, which begin side by side, may come near, but not meet.
         may_be_near = ~meets & ((steps_between(path, near) <= NEIGHBOURS) | excused[near].any(axis=0))
         fault[near[:, ~may_be_near]] = True
         folded = _folded(path, FOLD) & ~(excused[:-1] & excused[1:]) | _folded(path, RETURN)
@@ -148,7 +148,7 @@ class Guard:
     def moved(self, path: Polyline, target: FloatArray) -> Polyline:
         """The path with its nodes as far on the way to `target` (n, 2) as keeps it inside and simple.
 
-        What is too near or too sharp in the path as it is must not hold all the rest: it is excused as soon as
+        What is already too near or too sharp in the given path must not hold up the rest: it is excused as soon as
         a segment is at fault that does not move, and in a second attempt from the start.
 
         Parameters
@@ -195,7 +195,7 @@ class Guard:
         return None
 
     def thinned(self, path: Polyline, drop: Mask) -> Polyline:
-        """The path without the nodes to drop, but for those whose loss would put it at fault.
+        """The path without the nodes to drop, except for those whose loss would put it at fault.
 
         Parameters
         ----------
@@ -233,7 +233,7 @@ def _ends(segment: Mask) -> Mask:
 
 
 def _of_any(node: Mask) -> Mask:
-    """The segments (n - 1,) of which either end is chosen (n,)."""
+    """The segments (n - 1,) with either end among the chosen nodes (n,)."""
     return np.asarray(node[:-1] | node[1:])
 
 

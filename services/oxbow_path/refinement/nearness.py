@@ -33,6 +33,11 @@ def may_meet(path: Polyline, asked: Indices, reach_m: FloatArray, most_m: float)
         How far each segment may move, plus half the distance that counts as near; shape (n - 1,).
     most_m
         The longest piece of a segment that is searched for as one.
+
+    Returns
+    -------
+    ndarray of int, shape (2, m)
+        The lesser number of each pair first; no pair twice.
     """
     # A search over circles finds pairs as far apart as the widest: one long segment would pair with half the path.
     longest_m = min(most_m, PIECE * float(path.lengths_m.mean()))
@@ -150,7 +155,7 @@ def beyond(path: Polyline, pairs: Indices, steps: int) -> Indices:
 
 
 def _gaps_m(nodes: FloatArray, pairs: Indices) -> FloatArray:
-    """The distance between the two segments of each pair (2, m), but for rounding."""
+    """The distance between the two segments of each pair (2, m), up to rounding."""
     (a, b), (c, d) = ((nodes[one], nodes[one + 1]) for one in pairs)
     apart = np.min([_from_segment_m(*ends) for ends in ((a, c, d), (b, c, d), (c, a, b), (d, a, b))], axis=0)
     crosses = (_side(a, c, d) * _side(b, c, d) < 0.0) & (_side(c, a, b) * _side(d, a, b) < 0.0)

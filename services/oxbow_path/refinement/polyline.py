@@ -1,4 +1,4 @@
-"""The path as nodes that move, but for those that must stay."""
+"""The path as nodes that move, except for those that must stay."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Polyline:
         return Polyline(nodes, self.pinned, self.legs, self.rigid)
 
     def divided(self, most_m: float) -> Polyline:
-        """With nodes added so that no segment is longer than `most_m`, but for legs and rigid ones."""
+        """With nodes added so that no segment is longer than `most_m`, except for legs and rigid ones."""
         pieces = np.maximum(1, np.ceil(self.lengths_m / most_m).astype(int))
         pieces[self.legs | self.rigid] = 1
         return self._cut(pieces)

@@ -93,7 +93,7 @@ def refined(
     Parameters
     ----------
     path
-        A simple path inside `free` but for its legs.
+        A simple path inside `free` except for its legs.
     free
         The free space.
     samples

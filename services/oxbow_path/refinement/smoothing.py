@@ -33,7 +33,7 @@ def smoothed(path: Polyline, free: Polygon, spacing_m: float) -> LineString:
     Parameters
     ----------
     path
-        Simple, and inside `free` but for its legs, which stay as they are.
+        Simple, and inside `free` except for its legs, which stay as they are.
     free
         The free space.
     spacing_m

@@ -1,6 +1,6 @@
 """Geodesic distances: the lengths of shortest ways inside the water.
 
-A shortest way in a polygon is straight but for corners of the shore (Lee and Preparata 1984). The graph over sites
+A shortest way in a polygon turns only at corners of the shore (Lee and Preparata 1984). The graph over sites
 and corners joins those that see each other nearby, and the corners of every triangle of a constrained Delaunay
 triangulation, so that it is connected wherever the water is, however narrow. Its ways are inside the water; one
 that passes far from any corner that it could turn at may be a little longer than the shortest.

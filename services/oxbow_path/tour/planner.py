@@ -51,7 +51,7 @@ LEAST_SITES = 4
 """Fewer sites have one tour only."""
 
 NEAR = 4.0
-"""Sites farther apart than this, in pitches, do not follow each other, but for legs of the first tour."""
+"""Sites farther apart than this, in pitches, do not follow each other, except for legs of the first tour."""
 
 GAP = 0.85
 """Water farther than this from every site is given one more, in pitches."""
@@ -98,11 +98,12 @@ class TourTrial:
 
     @property
     def path(self) -> LineString:
-        """From launch to recovery, simple and inside the free space but for its legs."""
+        """From launch to recovery, simple and inside the free space except for its legs."""
         return self.trial.path
 
     @property
     def length_m(self) -> float:
+        """The length of the path."""
         return self.trial.length_m
 
     def fits(self, budget: Budget) -> bool:
@@ -220,7 +221,7 @@ class _Attempt:
         return with_gaps(np.vstack([entries, centres]), self.waters.probe.points, GAP * pitch_m)
 
     def _solution(self, geodesics: Geodesics, near_m: float) -> Solution:
-        """A short tour; of fewer than four sites there is but one."""
+        """A short tour; of fewer than four sites there is only one."""
         if geodesics.count < LEAST_SITES:
             return Solution(np.arange(geodesics.count), "")
         return self.solver(first_tour(geodesics, near_m), seed=self.seed)

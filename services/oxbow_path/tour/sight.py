@@ -85,7 +85,7 @@ def _meetings(p: FloatArray, q: FloatArray, a: FloatArray, b: FloatArray) -> tup
 
 
 def _turn(start: FloatArray, end: FloatArray, place: FloatArray) -> FloatArray:
-    """1 where places lie to the left of lines, -1 to the right, 0 in line with them but for rounding."""
+    """1 where places lie to the left of lines, -1 to the right, 0 in line with them up to rounding."""
     ahead, aside = end - start, place - start
     sine = cross(ahead, aside)
     slack = IN_LINE * np.hypot(*ahead.T) * np.hypot(*aside.T)

@@ -47,7 +47,7 @@ def slit(region: Polygon, slits: Geometries) -> Polygon:
     rest = region.difference(shapely.union_all(slits))
     if _is_whole(rest):
         return rest
-    # Slits that together part it, but for those that join the parts again.
+    # Slits that together part it, except for those that join the parts again.
     joining = _joining(shapely.get_parts(rest), slits)
     rest = region.difference(shapely.union_all(slits[~joining]))
     if _is_whole(rest):

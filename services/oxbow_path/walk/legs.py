@@ -117,7 +117,7 @@ class Access:
 
 @dataclass(frozen=True)
 class Passable:
-    """Where a path may run but for its legs."""
+    """Where a path may run except for its legs."""
 
     free: Polygon
 
@@ -363,7 +363,7 @@ def _aside(place: FloatArray, towards: FloatArray, offset_m: float) -> FloatArra
 
 
 def _beside(access: Access, offset_m: float, side: float) -> FloatArray:
-    """The way back along a leg, but for its entry: moved aside, over land by a hair, from there on ever more."""
+    """The way back along a leg, without its entry: moved aside, over land by a hair, then ever farther."""
     leg = access.leg
     steps = np.hypot(*np.diff(leg, axis=0).T)
     if len(leg) <= 2 or steps.sum() == 0:

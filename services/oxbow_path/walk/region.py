@@ -175,6 +175,11 @@ def simply_connected(region: Polygon, free: Polygon, probe: Probe, *, cut_width_
         Width of the cuts; narrower where one this wide would cut off more than itself.
     reach_m
         How far water may be from the path.
+
+    Returns
+    -------
+    Walk
+        The region without holes, the cuts, and the holes that were enclosed.
     """
     if not region.interiors:
         return Walk(clear_of_land(region, free))

@@ -47,6 +47,7 @@ class Budget:
         return ENOUGH * self.limit_m
 
     def fits(self, length_m: float) -> bool:
+        """Whether a path of this length may be planned."""
         return length_m <= self.most_m
 
     def too_short(self, shortest_m: float) -> Infeasible:

@@ -24,6 +24,7 @@ class Transect:
 
     @property
     def length_m(self) -> float:
+        """From shore to shore."""
         return self.high - self.low
 
 

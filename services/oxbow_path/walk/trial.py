@@ -77,10 +77,12 @@ class Pattern:
 
     @property
     def half_width_m(self) -> float:
+        """How far a leg stands from the line that it runs beside: half the spacing."""
         return self.spacing_m / 2
 
     @property
     def reach_m(self) -> float:
+        """How far water may stay from the path."""
         return self.reach * self.half_width_m
 
     @property
@@ -105,6 +107,7 @@ class Trial:
 
     @property
     def length_m(self) -> float:
+        """The length of the path, legs included."""
         return float(self.path.length)
 
 
