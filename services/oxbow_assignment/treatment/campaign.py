@@ -83,7 +83,7 @@ def plan_campaign(
     danger: Danger = NO_DANGER,
     seed: int = 0,
 ) -> Campaign:
-    """Plan the treatment of hot spots (Rendas and Li 2016, section 1.3).
+    """Plan the treatment of hot spots (Rendas and Li 2016, introduction).
 
     Parameters
     ----------

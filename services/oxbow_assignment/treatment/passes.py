@@ -30,7 +30,7 @@ ENOUGH = 0.9
 def parallel_passes(region: BaseGeometry, free: Polygon, swath_m: float) -> list[LineString]:
     """Passes at most `swath_m` apart, along the heading that needs least length.
 
-    Treatment missions are planned with the geometric planners of maps (Rendas and Li 2016, section 1.3): here
+    Treatment missions are planned with the geometric planners of maps (Rendas and Li 2016, introduction): here
     parallel transects. They are fewest along an edge of the convex hull across which the region is narrow (W. H.
     Huang, 2001). The outermost run half a spacing inside the region's rim, and each reaches from one end to the
     other of what its band holds of the region.
