@@ -245,7 +245,7 @@ def test_parts_not_connected_are_dropped_and_listed():
     for part in space.dropped:
         assert part.area_m2 == part.outline.area
         assert part.outline.contains(Point(part.place))
-    assert any("2 of " in warning for warning in space.warnings)
+    assert any("dropped 2 parts, " in warning for warning in space.warnings)
 
 
 def test_a_narrow_strait_is_not_closed_by_simplification():
