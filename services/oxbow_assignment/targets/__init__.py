@@ -1,1 +1,1 @@
-"""Sharing targets out among vehicles: clusters, matching, order, and moves between tours."""
+"""Assigning targets to vehicles: clusters, matching, order, and moves between tours."""

@@ -1,8 +1,7 @@
-"""Share targets out among vehicles: cluster, match, order; then mend.
+"""Assign targets to vehicles: cluster, match, order; then improve.
 
 Clusters of targets go to vehicles, and each vehicle puts its own in order (Innocenti, Pollini and Bracci 2006,
-section 4.4). The report has no ranges and no idea of balance; what that leaves to do is done by insertions and
-exchanges.
+section 4.4). The report knows neither ranges nor balance; insertions and exchanges account for these afterwards.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from oxbow_assignment.targets.pseudo_coordinates import PseudoCoordinates, pseud
 __all__ = ["ClusterMethod", "Clustered", "Clustering", "assign", "cluster_paths", "mended"]
 
 STARTS = 3
-"""Starts of k-means: three leave two thirds of one's gap to the joint optimiser, five hardly less than three."""
+"""Starts of k-means: three leave two thirds of the gap of one to the joint optimiser, five hardly less."""
 
 
 class ClusterMethod(enum.StrEnum):
@@ -47,17 +46,17 @@ class Clustering:
     method
         k-means or fuzzy c-means with `k` clusters, or as many as `radius_m` asks for.
     k
-        The number of clusters; by default as many as vehicles that can visit a target. At most the number of
-        targets are made.
+        The number of clusters; by default the number of vehicles that can visit a target. There are never more
+        clusters than targets.
     radius_m
-        The longest mean route from a target to its cluster's targets, for `ClusterMethod.RADIUS` and only for it.
+        The longest mean route from a target to its cluster's targets; for `ClusterMethod.RADIUS` and only for it.
     seed, starts
-        Where k-means starts, and how often it starts anew: the best assignment counts.
+        The seed of k-means, and how many times it starts: the best assignment counts.
 
     Raises
     ------
     InvalidMission
-        A number or a radius that is missing, out of place or not positive.
+        A number or a radius is missing, out of place or not positive.
     """
 
     method: ClusterMethod = ClusterMethod.K_MEANS
@@ -86,14 +85,16 @@ class Clustered:
 
     Parameters
     ----------
+    assignment
+        Who visits which targets.
     targets : ndarray of shape (m,)
         The targets that were clustered: those that some vehicle can visit.
     clusters
-        Their clusters.
+        Their clusters; None if there are no such targets.
     owners : ndarray of shape (k,)
         The index of the vehicle that each cluster was matched to.
     stress
-        How ill the clusters' space pictures the routes; see `PseudoCoordinates`.
+        How badly the clusters' space represents the routes; see `PseudoCoordinates`.
     """
 
     assignment: Assignment
@@ -104,9 +105,20 @@ class Clustered:
 
 
 def assign(problem: Problem, clustering: Clustering | None = None) -> Clustered:
-    """Who visits which targets in which order, by clusters.
+    """Assign targets to vehicles by clusters.
 
-    Every tour is within its vehicle's range, and every target is in a tour or among the unserved.
+    Parameters
+    ----------
+    problem
+        The targets, the vehicles, and the routes between them.
+    clustering
+        How targets are clustered; by default `Clustering()`.
+
+    Returns
+    -------
+    Clustered
+        The best assignment of all starts. Every tour is within its vehicle's range, and every target is either in
+        a tour or among the unserved.
     """
     clustering = clustering or Clustering()
     targets = np.flatnonzero(problem.can_visit.any(axis=0))
@@ -131,7 +143,24 @@ def _by_clusters(
 
 
 def cluster_paths(problem: Problem, targets: Indices, clusters: Clusters, owners: Indices) -> list[Indices]:
-    """Each vehicle's path through its own clusters, as far as its range allows: all that the report does."""
+    """Each vehicle's path through its own clusters, as far as its range allows: all that the report does.
+
+    Parameters
+    ----------
+    problem
+        The targets, the vehicles, and the routes between them.
+    targets
+        The targets that were clustered, shape (m,).
+    clusters
+        Their clusters.
+    owners
+        The index of each cluster's vehicle, shape (k,).
+
+    Returns
+    -------
+    list of ndarray of int
+        One path per vehicle: rows of the problem's distances, start first and recovery last.
+    """
     own = owners[clusters.labels]
     return [
         trimmed(
@@ -144,27 +173,31 @@ def cluster_paths(problem: Problem, targets: Indices, clusters: Clusters, owners
 
 
 def mended(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
-    """Paths after insertions, exchanges and trades, in turns until nothing more is gained.
+    """Paths after insertions, exchanges and trades, which alternate until nothing more is gained.
 
     Parameters
     ----------
+    problem
+        The targets, the vehicles, and the routes between them.
     paths
-        One a vehicle, each within its range: rows of the problem's distances, start first and recovery last.
+        One per vehicle, each within its range: rows of the problem's distances, start first and recovery last.
     held
         How many leading targets of each path stay in front.
     """
     while True:
         paths = exchanged(problem, inserted(problem, paths, held), held)
         traded_paths = traded(problem, paths, held)
+        # By identity: `traded` returns the same array for a path that it leaves alone.
         if all(path is before for path, before in zip(traded_paths, paths, strict=True)):
             return [_exact(problem, vehicle, path, held[vehicle]) for vehicle, path in enumerate(paths)]
         paths = traded_paths
 
 
 def _exact(problem: Problem, vehicle: int, path: Indices, held: int) -> Indices:
-    """A path in the best order behind its held targets, if it has few enough to find it, within its range."""
+    """A path in the best order behind its held targets; unchanged if they are too many, or it is out of range."""
     if len(path) - held > EXACT_MOST + 2:
         return path
+    # The least cost is not the least length where there is danger: the cheapest order may exceed the range.
     best = np.concatenate([path[:held], exact_path(problem.figures[COST, vehicle], path[held:])])
     return best if problem.is_within_range(vehicle, best) else path
 

@@ -1,4 +1,4 @@
-"""Who visits which targets, in which order, and what that costs."""
+"""Assignments: which vehicle visits which targets, in which order, and at what cost."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["Assignment", "Tour", "Unserved", "assignment_of", "tour_figures", "t
 class Tour:
     """What one vehicle does: its targets in order, from its start to its recovery.
 
-    A vehicle without targets stays where it is: 0 m. `cost_s` is its duration and what danger on its way is worth.
+    A vehicle without targets stays where it is: 0 m. `cost_s` is its duration plus the price of danger on its way.
     """
 
     vehicle: str
@@ -29,15 +29,15 @@ class Tour:
 
 @dataclass(frozen=True)
 class Unserved:
-    """A target that nobody visits, and why.
+    """A target that no vehicle visits, and why.
 
     Parameters
     ----------
     target
         Its index.
     detour_m
-        By how much it would lengthen the tour of a vehicle with its role, at the least; infinite without such a
-        vehicle or route.
+        The least by which it would lengthen the tour of a vehicle with its role, in metres; infinite without such
+        a vehicle or route.
     reason
         What is missing: a role, range, or range left beside the other targets.
     """
@@ -49,12 +49,18 @@ class Unserved:
 
 @dataclass(frozen=True)
 class Assignment:
-    """Tours, one a vehicle, each within its vehicle's range; targets are in one tour or unserved.
+    """Tours, one per vehicle, each within its vehicle's range; every target is in one tour or unserved.
 
     Parameters
     ----------
+    tours
+        In the order of the problem's vehicles.
+    unserved
+        Targets that no vehicle visits, in ascending order.
+    objective
+        What the assignment minimises.
     value
-        What the targets that are visited are worth.
+        The summed value of the targets that are visited.
     """
 
     tours: tuple[Tour, ...]
@@ -88,19 +94,43 @@ class Assignment:
 
 
 def tour_figures(problem: Problem, vehicle: int, path: Indices) -> FloatArray:
-    """Cost and length of one vehicle's path, shape (2,), in metres; 0 without targets."""
+    """Cost and length of one vehicle's path, shape (2,), in metres; 0 without targets.
+
+    Parameters
+    ----------
+    problem
+        The routes.
+    vehicle
+        Its index.
+    path
+        Rows of the problem's distances, start first and recovery last.
+    """
     if len(path) <= 2:
         return np.zeros(2)
     return np.asarray(problem.figures[:, vehicle, path[:-1], path[1:]].sum(axis=1))
 
 
 def tour_length(problem: Problem, vehicle: int, path: Indices) -> float:
-    """Length of one vehicle's path; 0 without targets."""
+    """Length of one vehicle's path, in metres; 0 without targets.
+
+    Parameters
+    ----------
+    problem, vehicle, path
+        See `tour_figures`.
+    """
     return float(tour_figures(problem, vehicle, path)[LENGTH])
 
 
 def assignment_of(problem: Problem, paths: Sequence[Indices]) -> Assignment:
-    """The assignment in which each vehicle goes its path: rows of the distances, start first and recovery last."""
+    """The assignment in which each vehicle travels its path.
+
+    Parameters
+    ----------
+    problem
+        The targets, the vehicles, and the routes between them.
+    paths
+        One per vehicle: rows of the problem's distances, start first and recovery last.
+    """
     figures = np.array([tour_figures(problem, vehicle, path) for vehicle, path in enumerate(paths)])
     tours = tuple(
         Tour(
@@ -112,7 +142,7 @@ def assignment_of(problem: Problem, paths: Sequence[Indices]) -> Assignment:
         )
         for vehicle, path, own in zip(problem.vehicles, paths, figures, strict=True)
     )
-    # In order: the same targets are worth the same, whoever visits them.
+    # Summed in order of targets, so that rounding gives the same targets the same value, whoever visits them.
     served = np.array(sorted(target for tour in tours for target in tour.targets), dtype=int)
     left = np.setdiff1d(np.arange(problem.count), served)
     return Assignment(
@@ -136,7 +166,7 @@ def _unserved(
 
 
 def _detours(problem: Problem, vehicle: int, path: Indices, targets: Indices) -> FloatArray:
-    """By how much each target would lengthen a vehicle's path, where it does so least; shape (n,)."""
+    """The least by which each target would lengthen a vehicle's path, in metres, shape (n,)."""
     away = problem.lengths[vehicle][np.ix_(targets, path)]
     known = problem.figures[LENGTH, vehicle, path[:-1], path[1:]] if len(path) > 2 else np.zeros(1)
     detours: FloatArray = (away[:, :-1] + away[:, 1:] - known).min(axis=1)

@@ -1,7 +1,7 @@
 """Clusters of targets: k-means, fuzzy c-means, and a number of clusters that follows from a radius.
 
-Targets are pseudo-coordinates (Innocenti, Pollini and Bracci 2006, section 4.4). Each has a weight between 0
-and 1, which fades after a visit: the centres move smoothly, and clusters do not churn.
+Targets are given by pseudo-coordinates (Innocenti, Pollini and Bracci 2006, section 4.4). Each has a weight
+between 0 and 1, which fades after a visit, so that the centres move smoothly and clusters do not churn.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from oxbow_assignment.targets.pseudo_coordinates import PseudoCoordinates
 __all__ = ["Clusters", "cluster_by_radius", "faded", "fuzzy_c_means", "k_means", "mean_distances"]
 
 TURNS = 100
-"""Most turns of an iteration; k-means stands still long before."""
+"""The most iterations; k-means converges long before."""
 
 FUZZINESS = 2.0
 """The exponent of fuzzy c-means that J. C. Bezdek (1981) recommends."""
 
 STILL = 1e-4
-"""Memberships that change less than this have settled."""
+"""Memberships that change by less than this have converged."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,9 @@ class Clusters:
     labels : ndarray of shape (n,)
         The cluster of each target, 0 to k - 1.
     centres : ndarray of shape (k, d)
-        In the space of the pseudo-coordinates; start from these to cluster again when little has changed.
+        In the space of the pseudo-coordinates, in metres; start from these to cluster again after small changes.
     memberships : ndarray of shape (n, k)
-        How much each target belongs to each cluster; rows add up to 1, and are 0 or 1 for k-means.
+        How much each target belongs to each cluster; rows sum to 1, and entries are 0 or 1 for k-means.
     """
 
     labels: Indices
@@ -53,7 +53,7 @@ def faded(since_visit_s: FloatArray, fade_s: float) -> FloatArray:
     """Weights of targets: 1 before a visit, then smoothly down to 0 in `fade_s` seconds.
 
     The report asks for a weight in [0, 1] that decreases smoothly from one to zero after the visit, and gives no
-    formula; here it is half a period of a cosine, whose slope is 0 at both ends.
+    formula. This is half a period of a cosine, whose slope is 0 at both ends.
 
     Parameters
     ----------
@@ -61,6 +61,11 @@ def faded(since_visit_s: FloatArray, fade_s: float) -> FloatArray:
         Seconds since each target was visited; NaN for one that was not.
     fade_s
         Seconds that fading takes, > 0.
+
+    Raises
+    ------
+    InvalidMission
+        `fade_s` is not positive.
     """
     if not fade_s > 0.0:
         raise InvalidMission(f"is {fade_s!r} s; expected a number > 0", where="fade_s")
@@ -88,7 +93,9 @@ def k_means(
     weights : ndarray of shape (n,)
         Between 0 and 1, by default 1; see `faded`.
     centres : ndarray of shape (k, d)
-        Where to start; by default k-means++ (D. Arthur and S. Vassilvitskii, 2007) with `seed`.
+        Where to start; by default chosen by k-means++ (D. Arthur and S. Vassilvitskii, 2007).
+    seed
+        Seed of k-means++; unused if `centres` are given.
 
     Raises
     ------
@@ -113,11 +120,29 @@ def k_means(
 def fuzzy_c_means(
     coordinates: PseudoCoordinates, k: int, *, weights: FloatArray | None = None, seed: int = 0
 ) -> Clusters:
-    """Fuzzy c-means (J. C. Bezdek, 1981), begun with k-means; each target's label is its largest membership."""
+    """Fuzzy c-means (J. C. Bezdek, 1981), begun with k-means; each target's label is its largest membership.
+
+    Parameters
+    ----------
+    coordinates
+        The targets' places.
+    k
+        The number of clusters, at most the number of targets.
+    weights : ndarray of shape (n,)
+        Between 0 and 1, by default 1; see `faded`.
+    seed
+        Seed of the k-means that comes first.
+
+    Raises
+    ------
+    InvalidMission
+        More clusters than targets, or weights outside [0, 1].
+    """
     places, weights = coordinates.places, _checked_weights(coordinates, weights)
     crisp = k_means(coordinates, k, weights=weights, seed=seed)
     memberships, centres = crisp.memberships, crisp.centres
     for _ in range(TURNS):
+        # A target exactly at a centre would make this 0 / 0.
         squares = np.maximum(_squares(places, centres), np.finfo(float).tiny ** 0.5)
         closeness = (squares / squares.min(axis=1, keepdims=True)) ** (-1.0 / (FUZZINESS - 1.0))
         before, memberships = memberships, closeness / closeness.sum(axis=1, keepdims=True)
@@ -134,17 +159,24 @@ def cluster_by_radius(
 ) -> Clusters:
     """The report's dynamic procedure (Innocenti, Pollini and Bracci 2006, section 4.4, steps a to d).
 
-    The norm that the report leaves open is that of the largest difference: a target is then as far from a
-    centre as its mean route to the cluster's targets is long (`mean_distances`), and the radius is metres of
-    route. So when the procedure stops, no target with a weight has a mean route of more than `radius_m` to its
+    The norm, which the report leaves open, is that of the largest difference: a target's distance from a centre is
+    then the length of its mean route to the cluster's targets (`mean_distances`), and the radius is in metres of
+    route. When the procedure stops, no target of positive weight has a mean route of more than `radius_m` to its
     cluster. Centres move by k-means in the Euclidean norm.
 
     Parameters
     ----------
+    coordinates
+        The targets' places.
     radius_m
-        The report's r: larger than 0 for clusters, 0 for one cluster a place.
+        The report's r: above 0 for clusters, 0 for one cluster per place.
     weights : ndarray of shape (n,)
-        Between 0 and 1; a target that has faded away founds no cluster.
+        Between 0 and 1, by default 1; a target of weight 0 founds no cluster.
+
+    Raises
+    ------
+    InvalidMission
+        A radius that is negative or not a number, or weights outside [0, 1].
     """
     if not radius_m >= 0.0:
         raise InvalidMission(f"is {radius_m!r} m; expected a number >= 0", where="radius_m")
@@ -168,6 +200,15 @@ def mean_distances(
     It is also the largest difference between the target's column of distances and the mean column of the
     cluster: no difference is larger, because distances obey the triangle inequality, and the target's own row
     attains it.
+
+    Parameters
+    ----------
+    coordinates
+        The targets' places and distances.
+    clusters
+        Clusters of these targets. One whose targets all have weight 0 counts them alike.
+    weights : ndarray of shape (n,)
+        Between 0 and 1, by default 1.
     """
     shares = clusters.memberships * _checked_weights(coordinates, weights)[:, None]
     shares = np.where(shares.sum(axis=0) > 0.0, shares, clusters.memberships)
@@ -183,7 +224,7 @@ def _squares(places: FloatArray, centres: FloatArray) -> FloatArray:
 
 
 def _centroids(places: FloatArray, memberships: FloatArray, weights: FloatArray, before: FloatArray) -> FloatArray:
-    """Weighted means; a cluster whose targets have all faded away stays where it was."""
+    """Weighted means, shape (k, d); a cluster whose targets all have weight 0 stays where it was."""
     shares = memberships * weights[:, None]
     total = shares.sum(axis=0)
     means = (shares.T @ places) / np.where(total > 0.0, total, 1.0)[:, None]
@@ -191,7 +232,7 @@ def _centroids(places: FloatArray, memberships: FloatArray, weights: FloatArray,
 
 
 def _spread(places: FloatArray, k: int, weights: FloatArray, seed: int) -> FloatArray:
-    """k-means++: each next centre is a target drawn by its squared distance to those before."""
+    """k-means++: each further centre is a target, drawn with a chance that grows as its squared distance."""
     random = np.random.default_rng(seed)
     chances = weights if weights.any() else np.ones(len(places))
     chosen = [int(random.choice(len(places), p=chances / chances.sum()))]
@@ -203,12 +244,12 @@ def _spread(places: FloatArray, k: int, weights: FloatArray, seed: int) -> Float
             int(random.choice(len(places), p=drawn / drawn.sum())) if drawn.any() else int(random.choice(left))
         )
         squares = np.minimum(squares, _squares(places, places[chosen[-1:]])[:, 0])
-        squares[chosen] = 0.0
+        squares[chosen] = 0.0  # exactly: rounding must not let a target be drawn twice
     return places[chosen]
 
 
 def _fill_empty(labels: Indices, squares: FloatArray, k: int) -> None:
-    """Give every cluster without targets the target that is farthest from its own centre, in place."""
+    """Give every empty cluster the target that is farthest from its own centre; changes `labels` in place."""
     for empty in np.flatnonzero(np.bincount(labels, minlength=k) == 0):
         spare = np.bincount(labels, minlength=k)[labels] > 1
         own = np.where(spare, squares[np.arange(len(labels)), labels], -1.0)
@@ -220,7 +261,7 @@ def _checked_weights(coordinates: PseudoCoordinates, weights: FloatArray | None)
     if weights is None:
         return np.ones(count)
     if weights.shape != (count,) or not ((weights >= 0.0) & (weights <= 1.0)).all():
-        raise InvalidMission(f"expected {count} numbers from 0 to 1, one a target", where="weights")
+        raise InvalidMission(f"expected {count} numbers from 0 to 1, one per target", where="weights")
     return weights
 
 

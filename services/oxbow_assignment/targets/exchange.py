@@ -1,9 +1,9 @@
 """Moves between tours: once clusters are matched and ordered, targets change vehicles where that helps.
 
-The report stops at one tour a cluster. The three moves here mend what clustering cannot know: ranges, speeds,
-where vehicles start, and the load of each. All moves of a kind that join near targets are weighed in one array
-operation; those that gain most are made, each on tours that no other has touched; then these tours are put in
-order again.
+The report stops at one tour per cluster. Three kinds of moves make up for what clustering cannot know: ranges,
+speeds, where vehicles start, and the load of each. All moves of a kind that join near targets are evaluated in one
+array operation. Those that gain most are made, each on tours that no other move has changed; then these tours are
+put in order again.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from oxbow_assignment.targets.problem import COST, Problem
 __all__ = ["exchanged", "in_order"]
 
 NEAR = 10
-"""How many near targets of each target are looked at."""
+"""How many near targets of each target are considered."""
 
 
 def exchanged(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
@@ -29,8 +29,10 @@ def exchanged(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -
 
     Parameters
     ----------
+    problem
+        The targets, the vehicles, and the routes between them.
     paths
-        One a vehicle, within its range: rows of the problem's distances, start first and recovery last.
+        One per vehicle, within its range: rows of the problem's distances, start first and recovery last.
     held
         How many leading targets of each path stay in front.
     """
@@ -47,7 +49,19 @@ def exchanged(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -
 
 
 def in_order(problem: Problem, vehicle: int, path: Indices, held: int) -> Indices:
-    """A vehicle's path improved behind its held targets; as it is, where the better one is beyond its range."""
+    """A vehicle's path improved behind its held targets; unchanged if the better one is beyond its range.
+
+    Parameters
+    ----------
+    problem
+        The routes.
+    vehicle
+        Its index.
+    path
+        Rows of the problem's distances, start first and recovery last.
+    held
+        How many leading targets stay in front.
+    """
     better = np.concatenate([path[:held], improved_path(problem.figures[COST, vehicle], path[held:])])
     return better if problem.is_within_range(vehicle, better) else path
 
@@ -62,7 +76,7 @@ def _near(problem: Problem) -> Indices:
 
 @dataclass(frozen=True)
 class _Moves:
-    """Moves of one kind: what each gains, the two tours it changes, and the new path of each of these."""
+    """Moves of one kind: the gain of each, the two tours that it changes, and their new paths."""
 
     gains: FloatArray
     one: Indices
@@ -71,7 +85,7 @@ class _Moves:
 
 
 def _best_apart(kinds: Sequence[_Moves], layout: Layout) -> dict[int, Indices]:
-    """The paths that the best moves make, each on tours that no better one has touched."""
+    """The paths that the best moves make, each on tours that no better move has changed; by vehicle."""
     costs_m = layout.totals[COST]
     least = LEAST_GAIN * float(layout.problem.strain(costs_m, np.arange(len(costs_m))).sum())
     gains = np.concatenate([moves.gains for moves in kinds])
@@ -121,7 +135,7 @@ def _relocations(layout: Layout, near: Indices, length: int) -> _Moves:
 
 
 def _swaps(layout: Layout, near: Indices) -> _Moves:
-    """Let two near targets of different tours take each other's place."""
+    """Swap two near targets of different tours."""
     rows, figures = layout.rows, layout.problem.figures
     at = np.flatnonzero(layout.is_free)
     with_ = layout.place[near[rows[at]]]
@@ -151,8 +165,8 @@ def _swaps(layout: Layout, near: Indices) -> _Moves:
 def _tails(layout: Layout, near: Indices) -> _Moves:
     """Cut two tours and exchange what follows, so that near targets meet: 2-opt*.
 
-    J.-Y. Potvin and J.-M. Rousseau (1995). Each vehicle still ends at its own recovery. Vehicles must have the
-    same role for every target.
+    J.-Y. Potvin and J.-M. Rousseau (1995). Each vehicle still ends at its own recovery. Both vehicles must be able
+    to take the same targets by their roles.
     """
     cut = np.flatnonzero(layout.is_open & (layout.rows < len(near)))
     join = layout.place[near[layout.rows[cut]]]
@@ -178,7 +192,7 @@ def _tails(layout: Layout, near: Indices) -> _Moves:
 
 
 def _spliced(layout: Layout, head: Indices, tail: Indices) -> FloatArray:
-    """Figures of paths up to the places `head`, then from the places `tail` of other paths to their own ends."""
+    """Figures of paths up to the places `head`, then along other paths from `tail`, then to their own recovery."""
     figures, rows, owner = layout.problem.figures, layout.rows, layout.tour[head]
     recovery, last = layout.lasts[owner], layout.lasts[layout.tour[tail]] - 1
     before = layout.between(owner, layout.firsts[owner], head)

@@ -1,4 +1,4 @@
-"""Fit tours into ranges: targets that are too much are taken out, and put in where there is range left."""
+"""Fit tours into ranges: targets that are too many are taken out, and inserted where range is left."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ VALUE_ROUNDING = 1e-9
 """Differences of value below this are rounding."""
 
 FAR_M = 1e12
-"""A detour that does not fit counts as so long, where a finite figure is needed."""
+"""The length of a detour that does not fit, where a finite figure is needed."""
 
 LEAST_SAVED_S = 1e-6
 """Savings below this are rounding."""
@@ -28,8 +28,20 @@ def trimmed(
 ) -> Indices:
     """A path within its vehicle's range, of targets that it may visit.
 
-    While it is too long, the target goes that saves most metres for its value; a `wanted` target goes after all
-    others but the first `held`, which go last.
+    While the path is too long, the target that saves most metres for its value is removed.
+
+    Parameters
+    ----------
+    problem
+        The targets, the vehicles, and the routes between them.
+    vehicle
+        Its index.
+    path
+        Rows of the problem's distances, start first and recovery last.
+    held
+        How many leading targets are removed last.
+    wanted
+        A target that is removed only after all others except the held ones; None for no such target.
     """
     inner = path[1:-1]
     path = np.concatenate([path[:1], inner[problem.can_visit[vehicle, inner]], path[-1:]])
@@ -45,12 +57,14 @@ def trimmed(
 
 
 def inserted(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
-    """The paths with every target put in that fits: always the one that costs least for its value.
+    """The paths with every target inserted that fits, in each step the one that costs least for its value.
 
     Parameters
     ----------
+    problem
+        The targets, the vehicles, and the routes between them.
     paths
-        One a vehicle, within its range.
+        One per vehicle, within its range.
     held
         How many leading targets of each path stay in front.
     """
@@ -71,10 +85,24 @@ def inserted(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) ->
 
 
 def traded(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
-    """The paths with targets that nobody visits put in the place of others, where that is worth it.
+    """The paths with unserved targets in place of others, where that is worth it.
 
-    A target is put in although it does not fit, and others are trimmed: that stays if the path then serves more
-    value, or as much in less time. The first `held` targets of each path stay.
+    A target is inserted although it does not fit, and others are trimmed. The change is kept if the path then
+    serves more value, or as much in less time.
+
+    Parameters
+    ----------
+    problem
+        The targets, the vehicles, and the routes between them.
+    paths
+        One per vehicle, within its range.
+    held
+        How many leading targets of each path stay in front.
+
+    Returns
+    -------
+    list of ndarray of int
+        One path per vehicle; a path that is not changed is the same array as before.
     """
     paths = list(paths)
     served = np.concatenate([path[1:-1] for path in paths])
@@ -85,6 +113,7 @@ def traded(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> l
             for vehicle in np.flatnonzero(problem.can_visit[:, target]).tolist()
         ]
         best = min(trades, key=lambda trade: (-trade.value, trade.added_s))
+        # Ties change nothing: otherwise two targets could replace each other forever.
         if best.value > VALUE_ROUNDING or (best.value > -VALUE_ROUNDING and best.added_s < -LEAST_SAVED_S):
             paths[best.vehicle] = best.path
     return paths
@@ -92,7 +121,7 @@ def traded(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> l
 
 @dataclass(frozen=True)
 class _Trade:
-    """A path with a target put in and others taken out: the value and the seconds that this adds."""
+    """A path with a target inserted and others removed: the value and the seconds that this adds."""
 
     vehicle: int
     path: Indices
@@ -113,7 +142,7 @@ def _trade(problem: Problem, vehicle: int, path: Indices, held: int, target: np.
 
 @dataclass(frozen=True)
 class _Offers:
-    """For each target of a pool, where one path takes it best, and at what cost; infinite where it cannot."""
+    """For each target of a pool, where one path takes it best, and at what cost; infinite if it cannot."""
 
     costs: FloatArray
     places: Indices

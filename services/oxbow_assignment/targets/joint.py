@@ -1,7 +1,7 @@
-"""The joint optimiser: targets, vehicles and orders at once, and how far clusters stay behind it.
+"""The joint optimiser: targets, vehicles and orders at once, and the gap that clusters leave to it.
 
-Beyond the report, which clusters because the joint problem is NP-hard (Innocenti, Pollini and Bracci 2006,
-section 4.1). Needs the optional extra ``fleet`` (PyVRP).
+This goes beyond the report, which clusters because the joint problem is NP-hard (Innocenti, Pollini and Bracci
+2006, section 4.1). It needs the optional extra ``fleet`` (PyVRP).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ PATIENCE = 2_000
 """Iterations without improvement after which a search ends: a few seconds for 60 targets."""
 
 PRECISION = 0.005
-"""How near to the shortest makespan that was reached the longest lies that was not."""
+"""Bisection ends when the longest makespan not reached is within this fraction of the shortest one reached."""
 
 MISSING = "the optional extra `fleet` (PyVRP) is not installed: pip install 'oxbow[fleet]'"
 NOT_ASKED = "the joint optimiser was not asked for"
@@ -33,10 +33,10 @@ class Gap:
     Parameters
     ----------
     relative
-        The excess as a share of the joint optimiser's cost: 0.05 is 5 % more, below 0 is better than it. None
-        where there is no such figure.
+        The excess as a fraction of the joint optimiser's cost: 0.05 is 5 % more, below 0 is better than it. None
+        if there is no such figure.
     reason
-        Why there is none; empty where there is one.
+        Why there is none; empty if there is one.
     """
 
     relative: float | None
@@ -45,7 +45,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class Solution:
-    """The clustered assignment, the joint one if there is one, and how far the clusters stay behind it."""
+    """The clustered assignment, the joint one if there is one, and the gap between them."""
 
     clustered: Clustered
     joint: Assignment | None
@@ -53,14 +53,14 @@ class Solution:
 
     @property
     def best(self) -> Assignment:
-        """Whichever serves more value, or the same at less cost."""
+        """Whichever of the two serves more value, or the same value at less cost."""
         if self.joint is None:
             return self.clustered.assignment
         return min(self.clustered.assignment, self.joint, key=lambda found: found.rank)
 
     @property
     def best_gap(self) -> Gap:
-        """The gap between the best and the joint one: 0 where that is the best, below 0 where it is not."""
+        """The gap between the best and the joint one: 0 if the joint one is the best, below 0 if it is not."""
         return self.gap if self.joint is None else gap_to(self.best, self.joint)
 
 
@@ -74,7 +74,7 @@ def solve(
     problem, clustering
         See `assign`.
     patience, seed
-        See `optimise`; no joint optimiser where `patience` is None.
+        See `optimise`; the joint optimiser does not run if `patience` is None.
     """
     clustered = assign(problem, clustering)
     if patience is None or not is_available():
@@ -91,8 +91,18 @@ def is_available() -> bool:
 def optimise(problem: Problem, *, patience: int = PATIENCE, seed: int = 0) -> Assignment:
     """The best assignment that PyVRP's iterated local search finds; ranges are capacities.
 
-    A search ends by iterations, not by time: the same problem and seed give the same assignment. PyVRP knows no
-    makespan; for it, the longest duration allowed is bisected between what was reached and what was not.
+    A search ends by iterations, not by time: the same problem and seed give the same assignment. PyVRP cannot
+    minimise a makespan; the longest duration allowed is bisected instead, between what was reached and what was
+    not.
+
+    Parameters
+    ----------
+    problem
+        The targets, the vehicles, and the routes between them.
+    patience
+        Iterations without improvement after which a search ends.
+    seed
+        Seed of the search.
 
     Raises
     ------
@@ -118,9 +128,17 @@ def optimise(problem: Problem, *, patience: int = PATIENCE, seed: int = 0) -> As
 
 
 def gap_to(assignment: Assignment, joint: Assignment) -> Gap:
-    """The gap between two assignments of one problem, if they serve the same value."""
+    """The gap between two assignments of one problem, if they serve the same value.
+
+    Parameters
+    ----------
+    assignment
+        What is compared.
+    joint
+        What the joint optimiser found.
+    """
     if assignment.value != joint.value:
         return Gap(None, f"clusters serve targets worth {assignment.value:g}, the joint optimiser {joint.value:g}")
-    if assignment.cost_s == joint.cost_s:
+    if assignment.cost_s == joint.cost_s:  # both may be 0
         return Gap(0.0)
     return Gap(assignment.cost_s / joint.cost_s - 1.0)

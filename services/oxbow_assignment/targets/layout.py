@@ -1,4 +1,4 @@
-"""All tours as arrays, so that all moves between them can be weighed at once."""
+"""All tours as arrays, so that all moves between them can be evaluated at once."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ class Layout:
     Parameters
     ----------
     problem, paths
-        What they are paths of: rows of the distances, start first and recovery last.
+        The problem, and one path per vehicle: rows of its distances, start first and recovery last.
     rows, tour : ndarray of shape (m,)
-        The row at each place, and whose path it is on.
+        The row at each place, and the vehicle whose path it is on.
     along : ndarray of shape (2, v, m)
-        Figures from the first place of all, for each vehicle; what leads from one path to the next is 0.
+        Running sums of figures from the very first place, for each vehicle; steps from one path to the next are 0.
     edge : ndarray of shape (2, m)
-        Figures from each place to the next for the vehicle whose path it is: 0 for a path without targets, which
-        nobody goes.
+        Figures from each place to the next, for the vehicle whose path it is: 0 for a path without targets, which
+        is not travelled.
     is_open : ndarray of shape (m,)
         Whether something may come between a place and the next.
     is_free : ndarray of shape (m,)
-        Whether a place holds a target that may move.
+        Whether a place has a target that may move.
     place : ndarray of shape (n + 2 v,)
-        Where each row is; -1 for targets that nobody visits.
+        The place of each row; -1 for targets that no vehicle visits.
     firsts, fronts, lasts : ndarray of shape (v,)
-        The place of each start, of the last that stays behind it, and of each recovery.
+        The places of each start, of the last target held behind it (else the start), and of each recovery.
     totals : ndarray of shape (2, v)
         Each path's figures.
     """
@@ -56,7 +56,17 @@ class Layout:
 
     @classmethod
     def of(cls, problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> Layout:
-        """Lay out paths; their first `held` targets stay in front."""
+        """Lay out paths.
+
+        Parameters
+        ----------
+        problem
+            The targets, the vehicles, and the routes between them.
+        paths
+            One per vehicle: rows of the problem's distances, start first and recovery last.
+        held
+            How many leading targets of each path stay in front.
+        """
         sizes = np.array([len(path) for path in paths])
         rows, tour = np.concatenate(paths), np.repeat(np.arange(len(paths)), sizes)
         lasts = np.cumsum(sizes) - 1
@@ -79,11 +89,27 @@ class Layout:
         return cls(problem, paths, rows, tour, along, edge, is_open, is_free, place, firsts, fronts, lasts, totals)
 
     def between(self, vehicles: Indices, first: Indices, last: Indices) -> FloatArray:
-        """Figures for vehicles from one place of a path along it to a later one, shape (2, k)."""
+        """Figures from one place of a path along it to a later one, shape (2, k).
+
+        Parameters
+        ----------
+        vehicles
+            The vehicles that would travel there, maybe not the path's own, shape (k,).
+        first, last
+            The places, each pair on one path, shape (k,).
+        """
         return np.asarray(self.along[:, vehicles, last] - self.along[:, vehicles, first])
 
     def joint(self, left: Indices, right: Indices) -> FloatArray:
-        """Figures between two places of one path once nothing is between them: 0 if that empties it."""
+        """Figures between two places of one path once nothing is between them, shape (2, k).
+
+        They are 0 if the path is then empty, since a vehicle without targets stays where it is.
+
+        Parameters
+        ----------
+        left, right
+            The places, each pair on one path, shape (k,).
+        """
         owner = self.tour[left]
         is_empty = (left == self.firsts[owner]) & (right == self.lasts[owner])
         return np.where(is_empty, 0.0, self.problem.figures[:, owner, self.rows[left], self.rows[right]])
@@ -91,10 +117,21 @@ class Layout:
     def gains(
         self, one: Indices, new_one: FloatArray, other: Indices, new_other: FloatArray, possible: Mask
     ) -> FloatArray:
-        """What the objective gains if two tours get new figures; -inf where a tour would be too long."""
+        """What the objective gains by moves that each change two tours, shape (k,); -inf if a tour gets too long.
+
+        Parameters
+        ----------
+        one, other
+            The vehicles whose tours change, shape (k,).
+        new_one, new_other
+            Cost and length of their new tours, in metres, shape (2, k).
+        possible
+            Which moves the roles allow, shape (k,).
+        """
         strain, limits = self.problem.strain, self.problem.lengths_m * (1.0 - SUM_ROUNDING)
         fits = (new_one[LENGTH] <= limits[one]) & (new_other[LENGTH] <= limits[other])
         before = strain(self.totals[COST, one], one) + strain(self.totals[COST, other], other)
+        # Differences of running sums may come out just below 0.
         costs = np.maximum(new_one[COST], 0.0), np.maximum(new_other[COST], 0.0)
         after = strain(costs[0], one) + strain(costs[1], other)
         return np.where(possible & fits, before - after, -np.inf)

@@ -12,21 +12,24 @@ from oxbow_assignment.targets.problem import COST, Problem
 __all__ = ["match"]
 
 OUT_OF_REACH = 1e3
-"""How many times as much as the costliest target a target counts that a vehicle cannot visit."""
+"""A target that a vehicle cannot visit counts this many times the costliest route.
+
+It is finite, so that there is always a matching, even if no vehicle can visit all of a cluster.
+"""
 
 
 def match(problem: Problem, clusters: Clusters, targets: Indices) -> Indices:
     """The vehicle of each cluster, of least sum of mean costs (Innocenti, Pollini and Bracci 2006, 4.2 and 4.4).
 
-    A cluster costs a vehicle the mean duration of its routes to the cluster's targets. With more clusters than
-    vehicles the report adds fictitious vehicles; here the clusters that those would get are matched in further
-    rounds, each vehicle then coming from the cluster that it got last. With more vehicles than clusters some
-    get none.
+    The cost of a cluster to a vehicle is the mean duration of its routes to the cluster's targets. If there are
+    more clusters than vehicles, the report adds fictitious vehicles. Instead, the clusters that these would get
+    are matched in further rounds, in which each vehicle comes from the cluster that it got last. If there are more
+    vehicles than clusters, some get none.
 
     Parameters
     ----------
     problem
-        Its vehicles and distances.
+        The targets, the vehicles, and the routes between them.
     clusters, targets
         The clusters, and which targets of the problem were clustered, shape (n,).
 

@@ -1,7 +1,7 @@
 """The order in which one vehicle visits its targets: a path from its start to its recovery.
 
-Everything here speaks of rows of one matrix of distances; `path` is an array of rows, the start first and the
-recovery last. An order of targets is exact up to `EXACT_MOST` targets and a local optimum above.
+Paths are arrays of rows of one matrix of distances, the start first and the recovery last. The order of targets is
+exact up to `EXACT_MOST` targets and a local optimum above.
 """
 
 from __future__ import annotations
@@ -15,20 +15,28 @@ from oxbow.arrays import FloatArray, Indices
 __all__ = ["EXACT_MOST", "best_path", "exact_path", "improved_path", "inserted_path", "neighbours", "path_length"]
 
 EXACT_MOST = 12
-"""Most targets that are ordered exactly: 2^12 sets of targets times 12 last ones are a few milliseconds."""
+"""The most targets that are ordered exactly: 2^12 sets of targets times 12 last ones take a few milliseconds."""
 
 NEIGHBOURS = 10
-"""How many near targets of each target are looked at (D. S. Johnson and L. A. McGeoch, 1997, use 8 to 20)."""
+"""How many near targets of each target are considered (D. S. Johnson and L. A. McGeoch, 1997, use 8 to 20)."""
 
 SEGMENT = 3
-"""Most targets that move together (I. Or, 1976)."""
+"""The most targets that move together (I. Or, 1976)."""
 
 LEAST_GAIN = 1e-9
-"""Least gain, as a share of the path's length, that is not rounding."""
+"""Gains of no more than this fraction of the path's length are rounding."""
 
 
 def path_length(distances: FloatArray, path: Indices) -> float:
-    """Metres along a path."""
+    """Metres along a path.
+
+    Parameters
+    ----------
+    distances
+        In metres, shape (m, m).
+    path
+        Rows of `distances`, shape (n,).
+    """
     return float(distances[path[:-1], path[1:]].sum())
 
 
@@ -40,7 +48,7 @@ def best_path(distances: FloatArray, path: Indices) -> Indices:
     distances : ndarray of shape (m, m)
         Symmetric and finite, in metres.
     path : ndarray of shape (n + 2,)
-        Rows of `distances`; the first and the last stay, those between are in any order.
+        Rows of `distances`; the first and the last stay, those between may come in any order.
     """
     if len(path) <= EXACT_MOST + 2:
         return exact_path(distances, path)
@@ -51,7 +59,19 @@ def exact_path(distances: FloatArray, path: Indices) -> Indices:
     """The shortest path by dynamic programming over sets (M. Held and R. M. Karp, 1962; R. Bellman, 1962).
 
     `lengths[s, j]` is the least length from the start through the set s, a bit mask, ending at target j; sets
-    of one size are one array operation.
+    of one size are one array operation. Memory doubles with every target.
+
+    Parameters
+    ----------
+    distances
+        Symmetric and finite, in metres, shape (m, m).
+    path
+        Rows of `distances`, the first and the last of which stay, shape (n + 2,).
+
+    Returns
+    -------
+    ndarray of int, shape (n + 2,)
+        The same rows in the best order.
     """
     start, targets, end = path[0], path[1:-1], path[-1]
     n = len(targets)
@@ -73,7 +93,21 @@ def exact_path(distances: FloatArray, path: Indices) -> Indices:
 
 
 def inserted_path(distances: FloatArray, path: Indices) -> Indices:
-    """A path by farthest insertion (D. J. Rosenkrantz, R. E. Stearns and P. M. Lewis, 1977)."""
+    """A path by farthest insertion (D. J. Rosenkrantz, R. E. Stearns and P. M. Lewis, 1977).
+
+    Parameters
+    ----------
+    distances
+        Symmetric and finite, in metres, shape (m, m).
+    path
+        Rows of `distances`, the first and the last of which stay; the order of the others does not matter, but for
+        ties. Shape (n + 2,).
+
+    Returns
+    -------
+    ndarray of int, shape (n + 2,)
+        The same rows in another order.
+    """
     left, path = path[1:-1], path[[0, -1]]
     nearest = distances[np.ix_(left, path)].min(axis=1)
     while len(left):
@@ -91,8 +125,20 @@ def improved_path(distances: FloatArray, path: Indices) -> Indices:
     """A path that no 2-opt and no Or-opt move between neighbours shortens, its first and last row kept.
 
     2-opt reverses a stretch of the path (G. A. Croes, 1958), Or-opt moves up to `SEGMENT` targets elsewhere,
-    either way round (I. Or, 1976). Only moves that join near targets are looked at, all of them at once, and
-    the best is made.
+    either way round (I. Or, 1976). Only moves that join near targets are considered, all of them at once, and the
+    best is made.
+
+    Parameters
+    ----------
+    distances
+        Symmetric and finite, in metres, shape (m, m).
+    path
+        Rows of `distances`, shape (n,).
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        The same rows in an order that is no longer.
     """
     if len(path) < 4:
         return path
@@ -120,7 +166,7 @@ def neighbours(distances: FloatArray) -> Indices:
 
 @dataclass(frozen=True)
 class _Move:
-    """What a move gains, and which position of the path before stands at each position after it."""
+    """What a move gains, and for each position after it the position before it."""
 
     gain_m: float
     positions: Indices

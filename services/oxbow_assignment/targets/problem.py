@@ -1,7 +1,7 @@
-"""What is to be shared out: targets, vehicles, and the metres between them.
+"""The problem of assignment: targets, vehicles, and the routes between them.
 
-Routes have two figures: what they cost, danger included, and how long they are. Costs are what an assignment makes
-small; lengths are what must be within a range.
+Routes have two figures: their cost, danger included, and their length. An assignment minimises costs; lengths must
+be within a range.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ from oxbow.errors import InvalidMission
 __all__ = ["COST", "LENGTH", "SUM_ROUNDING", "Objective", "Problem", "require_distances"]
 
 COST, LENGTH = 0, 1
-"""The two figures of a route, first index of arrays that have both."""
+"""The two figures of a route: the first index of arrays that have both."""
 
 
 SUM_ROUNDING = 1e-12
-"""Lengths that are the same sum in another order differ by less than this share."""
+"""Sums of the same lengths in another order differ by less than this fraction."""
 
 SYMMETRY = 1e-6
-"""Least relative difference between there and back that is not rounding."""
+"""Relative differences between there and back of no more than this are rounding."""
 
 MAKESPAN_POWER = 8
-"""The sum of this power of durations stands for the longest."""
+"""The sum of this power of durations is a smooth stand-in for the longest."""
 
 
 class Objective(enum.StrEnum):
-    """What an assignment makes small, once as much value as possible is served.
+    """What an assignment minimises, once as much value as possible is served.
 
     `TOTAL` is the sum of all vehicles' durations: the team cost J of Innocenti, Pollini and Bracci 2006,
     section 4.2. It may leave vehicles at home. `MAKESPAN` is the longest duration: when the last vehicle is
-    done. Durations are those of costs: a metre that danger is worth counts as one that is travelled.
+    done. Durations are those of costs: the price of danger, in metres, counts as metres travelled.
     """
 
     TOTAL = "total"
@@ -52,24 +52,24 @@ class Problem:
     Parameters
     ----------
     vehicles
-        At least one; names are different.
+        At least one; no two have the same name.
     distances : ndarray of shape (n + 2 v, n + 2 v), or (v, n + 2 v, n + 2 v)
-        Metres along the routes between the n targets, then the v vehicles' starts, then their recoveries: what
+        Metres along the routes between the n targets, then the v vehicles' starts, then their recoveries, as
         `RouteTable` gives for these points in this order, for all vehicles or for each. Symmetric; infinite where
         there is no route.
     objective
-        What to make small.
+        What to minimise.
     values : ndarray of shape (n,)
-        What it is worth to visit each target; > 0, by default 1. Where not all can be visited, value comes first.
+        The value of visiting each target; > 0, by default 1. If not all can be visited, value comes first.
     roles
         For each target the role that a vehicle needs to visit it, or None for any; by default None for all.
     costs : ndarray of shape (n + 2 v, n + 2 v), or (v, n + 2 v, n + 2 v)
-        What the same routes cost, in metres; by default their lengths.
+        Costs of the same routes, in metres; by default their lengths.
 
     Raises
     ------
     InvalidMission
-        A field that breaks these rules.
+        A field breaks these rules.
     """
 
     vehicles: tuple[Vehicle, ...]
@@ -92,9 +92,9 @@ class Problem:
         if not len(self.values):
             object.__setattr__(self, "values", np.ones(self.count))
         if self.values.shape != (self.count,) or not (np.isfinite(self.values) & (self.values > 0)).all():
-            raise InvalidMission(f"expected {self.count} finite numbers > 0, one a target", where="values")
+            raise InvalidMission(f"expected {self.count} finite numbers > 0, one per target", where="values")
         if len(self.roles) not in (0, self.count):
-            raise InvalidMission(f"has {len(self.roles)}; expected {self.count}, one a target", where="roles")
+            raise InvalidMission(f"has {len(self.roles)}; expected {self.count}, one per target", where="roles")
 
     @property
     def count(self) -> int:
@@ -102,7 +102,15 @@ class Problem:
         return int(self.distances.shape[-1]) - 2 * len(self.vehicles)
 
     def path(self, vehicle: int, targets: Sequence[int] | Indices) -> Indices:
-        """The rows that a vehicle passes: its start, its targets and its recovery."""
+        """The rows that a vehicle passes: its start, its targets and its recovery.
+
+        Parameters
+        ----------
+        vehicle
+            Its index.
+        targets
+            Indices of targets, in order.
+        """
         return np.array([self.starts[vehicle], *targets, self.recoveries[vehicle]])
 
     @property
@@ -112,7 +120,7 @@ class Problem:
 
     @property
     def starts(self) -> Indices:
-        """Each vehicle's row."""
+        """The row of each vehicle's start."""
         return self.count + np.arange(len(self.vehicles))
 
     @property
@@ -122,7 +130,7 @@ class Problem:
 
     @cached_property
     def lengths_m(self) -> FloatArray:
-        """Each vehicle's range, shape (v,)."""
+        """Each vehicle's range, in metres, shape (v,)."""
         return np.array([vehicle.length_m for vehicle in self.vehicles])
 
     @cached_property
@@ -131,10 +139,22 @@ class Problem:
         return np.array([vehicle.speed_mps for vehicle in self.vehicles])
 
     def strain(self, costs_m: FloatArray, vehicles: Indices) -> FloatArray:
-        """What tours of these costs add to the objective, each for the vehicle beside it.
+        """What tours of these costs add to the objective, shape (k,).
 
-        The longest duration alone does not tell good moves between other tours: for `MAKESPAN` the strain is a
-        high power of the duration, whose sum the longest ones rule.
+        The longest duration alone cannot tell good moves between other tours from bad ones. For `MAKESPAN` the
+        strain is therefore a high power of the duration: the longest ones dominate the sum.
+
+        Parameters
+        ----------
+        costs_m
+            The costs of tours, in metres, shape (k,).
+        vehicles
+            The vehicle of each tour, shape (k,).
+
+        Returns
+        -------
+        ndarray of shape (k,)
+            Seconds for `TOTAL`, their power for `MAKESPAN`.
         """
         durations: FloatArray = costs_m / self.speeds_mps[vehicles]
         return durations**MAKESPAN_POWER if self.objective is Objective.MAKESPAN else durations
@@ -158,18 +178,26 @@ class Problem:
 
     @cached_property
     def mean_costs(self) -> FloatArray:
-        """What routes cost the vehicles on average, shape (n + 2 v, n + 2 v)."""
+        """Costs of routes, averaged over the vehicles, in metres, shape (n + 2 v, n + 2 v)."""
         return np.asarray(self.figures[COST].mean(axis=0))
 
     @cached_property
     def there_and_back_m(self) -> FloatArray:
-        """The length of the route of each vehicle that visits one target alone, shape (v, n)."""
+        """The length of each vehicle's tour of one target alone, in metres, shape (v, n)."""
         each = np.arange(len(self.vehicles))
         ends = self.lengths[each, self.starts] + self.lengths[each, self.recoveries]
         return np.asarray(ends[:, self.targets])
 
     def is_within_range(self, vehicle: int, path: Indices) -> bool:
-        """Whether a vehicle's path with targets is within its range."""
+        """Whether a vehicle's path is within its range; one without targets always is.
+
+        Parameters
+        ----------
+        vehicle
+            Its index.
+        path
+            Rows of the distances, start first and recovery last.
+        """
         length_m = float(self.figures[LENGTH, vehicle, path[:-1], path[1:]].sum())
         return len(path) <= 2 or length_m <= self.lengths_m[vehicle]
 
@@ -187,7 +215,13 @@ class Problem:
 
 
 def require_vehicles(vehicles: Sequence[Vehicle]) -> None:
-    """Check that there are vehicles, and that their names tell them apart."""
+    """Check that there are vehicles, and that no two have the same name.
+
+    Raises
+    ------
+    InvalidMission
+        There are none, or two have the same name.
+    """
     if not vehicles:
         raise InvalidMission("is empty; expected at least one vehicle", where="vehicles")
     names = [vehicle.name for vehicle in vehicles]
@@ -199,11 +233,18 @@ def require_vehicles(vehicles: Sequence[Vehicle]) -> None:
 
 
 def require_distances(distances: FloatArray) -> None:
-    """Check a matrix of distances: square, symmetric, no NaN, none negative, zero from a point to itself."""
+    """Check a matrix of distances: square, symmetric, no NaN, none negative, zero from a point to itself.
+
+    Raises
+    ------
+    InvalidMission
+        Names the first entry that is wrong, and what would be accepted.
+    """
     if distances.ndim != 2 or distances.shape[0] != distances.shape[1]:
         raise InvalidMission(f"has shape {distances.shape}; expected a square matrix", where="distances")
-    bad = ~(distances >= 0.0)
+    bad = ~(distances >= 0.0)  # not `< 0.0`, which lets NaN pass
     bad[np.diag_indices(len(distances))] |= np.diag(distances) != 0.0
+    # Infinite both ways is symmetric, but inf - inf is NaN: -1 stands for it, which no distance is.
     there, back = (
         np.where(np.isinf(distances), -1.0, distances),
         np.where(np.isinf(distances.T), -1.0, distances.T),

@@ -1,4 +1,4 @@
-"""Targets as points of a space in which nearness is nearness along routes."""
+"""Targets as points of a space in which near means near along routes."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from oxbow_assignment.targets.problem import require_distances
 __all__ = ["PseudoCoordinates", "pseudo_coordinates"]
 
 NOTHING = 1e-8
-"""The spread along an axis, as a share of the greatest, that is left out."""
+"""Axes with no more than this fraction of the greatest spread are left out."""
 
 
 @dataclass(frozen=True)
 class PseudoCoordinates:
-    """Targets by their distances to all targets.
+    """Targets, placed by their distances to all targets.
 
     Parameters
     ----------
@@ -28,10 +28,10 @@ class PseudoCoordinates:
         of the differences of the two targets' routes to all targets; it is never more than the route between
         the two.
     distances_m : ndarray of shape (n, n)
-        The distances along routes that the places were made of.
+        The distances along routes that the places were computed from.
     stress
-        How ill distances between places tell those along routes: Kruskal's stress-1, 0 for a perfect picture,
-        after the best common scale.
+        How badly distances between places represent those along routes: Kruskal's stress-1 after the best common
+        scale, 0 for a perfect fit.
     """
 
     places: FloatArray
@@ -46,7 +46,7 @@ def pseudo_coordinates(distances: FloatArray) -> PseudoCoordinates:
     difference this embeds any finite metric space without distortion (M. Fréchet, 1910);
     `clustering.mean_distances` uses that. The report leaves the norm open; places here are for the Euclidean
     norm of k-means, divided by sqrt(n), so that metres do not depend on the number of targets, and turned to
-    their principal axes, which changes no distance: axes that tell next to nothing are left out.
+    their principal axes, which changes no distance; axes with next to no spread are left out.
 
     Parameters
     ----------

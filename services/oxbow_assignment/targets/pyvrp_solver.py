@@ -1,6 +1,6 @@
 """The joint problem in PyVRP's terms (N. A. Wouda, L. Lan and W. Kool, 2024): the only module that imports it.
 
-PyVRP counts in integers: here centimetres and hundredths of a second, rounded up, so that what fits there fits.
+PyVRP counts in integers: centimetres and hundredths of a second, rounded up, so that what fits in PyVRP fits.
 """
 
 from __future__ import annotations
@@ -17,21 +17,30 @@ from oxbow_assignment.targets.problem import COST, LENGTH, Problem
 __all__ = ["solved"]
 
 PER_UNIT = 100
-"""Steps in a metre, and in a second."""
+"""PyVRP's units per metre, and per second."""
 
 PRIZE = 2.0
-"""How many times the durations of all vehicles' whole ranges the least value weighs, so that value comes first."""
+"""The least value weighs this many times the duration of all ranges together, so that value comes first."""
 
 
 def solved(problem: Problem, *, patience: int, seed: int, within_s: float | None = None) -> list[Indices]:
-    """Paths of least total duration, one a vehicle, among those that serve the greatest value.
+    """Paths of least total duration, one per vehicle, among those that serve the greatest value.
 
     Parameters
     ----------
+    problem
+        The targets, the vehicles, and the routes between them.
     patience
         Iterations without improvement after which the search ends.
+    seed
+        Seed of the search.
     within_s
-        The longest that any vehicle may take; by default as long as its range lasts.
+        The longest that any vehicle may take, in seconds; by default only its range limits it.
+
+    Returns
+    -------
+    list of ndarray of int
+        Rows of the problem's distances, start first and recovery last.
     """
     data = _data(problem, within_s)
     result = solve(data, NoImprovement(patience), seed=seed, collect_stats=False, display=False)
@@ -46,6 +55,7 @@ def _data(problem: Problem, within_s: float | None) -> ProblemData:
     metres, seconds = [], []
     for vehicle, speed_mps in enumerate(problem.speeds_mps):
         own = problem.figures[:, vehicle].copy()
+        # PyVRP has no pairs of vehicle and client that are forbidden: such a client lies beyond every range.
         barred = np.flatnonzero(~problem.has_role[vehicle])
         own[:, barred], own[:, :, barred] = far_m, far_m
         own[:, np.arange(own.shape[1]), np.arange(own.shape[1])] = 0.0
@@ -74,7 +84,7 @@ def _data(problem: Problem, within_s: float | None) -> ProblemData:
 
 
 def _most_danger_s(problem: Problem) -> float:
-    """What danger may be worth in all, at the most: on the costliest route from each place, for the slowest."""
+    """An upper bound of the price of all danger: the costliest route from each place, for the slowest vehicle."""
     danger_m = (problem.figures[COST] - problem.figures[LENGTH]).max(axis=(0, 1))
     return float(danger_m.sum() / problem.speeds_mps.min())
 

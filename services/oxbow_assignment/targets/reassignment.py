@@ -1,8 +1,8 @@
-"""Reassign what is left, when a vehicle is lost or a target is new, without sending vehicles to and fro.
+"""Reassign what is left when a vehicle is lost or a target is new, without sending vehicles back and forth.
 
 The Hungarian method alone may turn a vehicle round before it has visited anything (Innocenti, Pollini and
-Bracci 2006, section 4.2). Here a vehicle keeps its current target, the first of its tour, unless giving it up
-is worth more than a hysteresis.
+Bracci 2006, section 4.2). So a vehicle keeps its current target, the first of its tour, unless giving it up gains
+more than a hysteresis.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Reassignment:
     assignment
         The new tours.
     kept
-        The assignment in which everybody keeps the current target, where that is still within reach.
+        The assignment in which every vehicle keeps its current target, if that is still within reach.
     changed
         Names of the vehicles that give up a current target that they could have kept.
     """
@@ -41,26 +41,26 @@ class Reassignment:
 
 
 def reassign(problem: Problem, tours: Sequence[Sequence[int]], *, hysteresis_s: float) -> Reassignment:
-    """Who visits what is left, in which order.
+    """Reassign the targets that are left.
 
-    A lost vehicle is one that `problem` does not have any more, a new target one that is in no tour. First all
-    keep their current targets, and the rest is shared out anew. Then vehicles are let go, all at once or one
-    after another: that stays if it serves more value, or lowers the objective by more than `hysteresis_s` for
-    each current target that changes.
+    A lost vehicle is one that `problem` no longer has; a new target is one that is in no tour. First all vehicles
+    keep their current targets, and the rest is reassigned. Then vehicles are freed, all at once or one after
+    another. That is kept if it serves more value, or lowers the objective by more than `hysteresis_s` for each
+    current target that changes.
 
     Parameters
     ----------
     problem
-        What is left: vehicles where they are now, with the range that they have left, and targets not yet visited.
+        What is left: vehicles where they are now, with the range that remains, and targets not yet visited.
     tours
-        For each vehicle of the problem the targets it was to visit, in order, as targets of this problem.
+        For each vehicle of the problem, the targets that it was to visit, in order; targets of this problem.
     hysteresis_s
-        What the change of one current target must gain, in seconds of the objective; >= 0.
+        What each change of a current target must gain, in seconds of the objective; >= 0.
 
     Raises
     ------
     InvalidMission
-        Tours that do not fit the problem, or a hysteresis that is negative or not a number.
+        The tours do not fit the problem, or the hysteresis is negative or not a number.
     """
     if not hysteresis_s >= 0.0:
         raise InvalidMission(f"is {hysteresis_s!r} s; expected a number >= 0", where="hysteresis_s")
@@ -110,7 +110,7 @@ class _Candidate:
         return cls(paths, bound, assignment_of(problem, paths), changed)
 
     def rank(self, hysteresis_s: float) -> tuple[float, float]:
-        """Value first; then the objective, and the hysteresis for each change. Less is better."""
+        """Value first; then the objective, plus the hysteresis for each change. Less is better."""
         return -self.assignment.value, self.assignment.cost_s + hysteresis_s * len(self.changed)
 
 
@@ -121,7 +121,7 @@ def _first(path: Indices) -> int | None:
 
 def _require_tours(problem: Problem, tours: Sequence[Sequence[int]]) -> None:
     if len(tours) != len(problem.vehicles):
-        raise InvalidMission(f"has {len(tours)}; expected {len(problem.vehicles)}, one a vehicle", where="tours")
+        raise InvalidMission(f"has {len(tours)}; expected {len(problem.vehicles)}, one per vehicle", where="tours")
     for target, times in Counter(target for tour in tours for target in tour).items():
         if not 0 <= target < problem.count:
             raise InvalidMission(f"has target {target}; expected 0 to {problem.count - 1}", where="tours")
