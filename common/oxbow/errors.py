@@ -57,13 +57,19 @@ class OxbowError(Exception):
 
 
 def described(error: BaseException) -> str:
-    """Kind and text of an exception that nobody expected, also of one that cannot be turned into text."""
+    """Kind and text of an unexpected exception, even of one whose own `str` fails."""
     return "".join(traceback.format_exception_only(error)).strip()
 
 
 @contextmanager
 def renamed(fields: Mapping[str, str]) -> Iterator[None]:
-    """Say of errors which field they are about by the name that it has for whoever gave it."""
+    """Rename the fields in errors raised within to the names that the user knows them by.
+
+    Parameters
+    ----------
+    fields
+        The user's name of each field; other fields keep theirs.
+    """
     try:
         yield
     except OxbowError as error:
@@ -101,7 +107,7 @@ class DeadlineExceeded(OxbowError):
 
 
 class Cancelled(OxbowError):
-    """Whoever asked for it wants it no more."""
+    """The caller has withdrawn the request."""
 
     code = ErrorCode.CANCELLED
 
@@ -119,7 +125,7 @@ BY_CODE: dict[ErrorCode, type[OxbowError]] = {
 
 
 MOST_TEXT = 10_000
-"""Characters of an error's message that travel."""
+"""The most characters of an error's message that are sent."""
 
 
 class ErrorReply(msgspec.Struct, frozen=True, kw_only=True):
@@ -140,6 +146,6 @@ class ErrorReply(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def _sendable(text: str) -> str:
-    """`text` without what is no Unicode, cut off where it is too long to be read."""
+    """`text` without lone surrogates, which UTF-8 cannot encode, and cut off where it is too long to be read."""
     shown = text if len(text) <= MOST_TEXT else f"{text[:MOST_TEXT]}... ({len(text)} characters)"
     return shown.encode(errors="replace").decode()

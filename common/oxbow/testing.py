@@ -120,7 +120,7 @@ def _largest(shape: BaseGeometry) -> Polygon:
 
 
 def _with_rings(water: Polygon, islands: Iterable[Polygon]) -> Polygon:
-    """The polygon with exactly these holes: no overlay that would put a vertex where rings touch."""
+    """The polygon with exactly these holes: an overlay would put a vertex where rings touch."""
     return Polygon(water.exterior, [island.exterior for island in islands])
 
 

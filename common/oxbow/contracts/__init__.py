@@ -2,7 +2,7 @@
 
 All geometry is planar, in metres, in the mission's local frame (`oxbow.geometry.frame`): x east, y north.
 A message that exists is valid: `__post_init__` enforces its invariants on both sides of the bus.
-Each stage has a module here. Key expressions stand in `keys` and nowhere else.
+Each stage has a module in this package. Key expressions are in `keys` and nowhere else.
 """
 
 from oxbow.contracts.assignment import Assignment, AssignRequest, HotSpot, LeftSpot, Role, Share, Sortie, Vehicle

@@ -40,9 +40,9 @@ class Vehicle(Message, frozen=True, kw_only=True):
     Parameters
     ----------
     name
-        What the mission calls it.
+        Its name in the mission.
     role
-        What it is for.
+        Whether it surveys or treats.
     speed_mps
         Its speed along a route.
     length_m
@@ -50,10 +50,10 @@ class Vehicle(Message, frozen=True, kw_only=True):
     start, recovery
         Where it is now and where it ends.
     danger_factor
-        At least 1: how many times as much danger counts for it; `a` of Innocenti, Pollini and Bracci 2006,
-        section 3.
+        How many times as much danger counts for it, at least 1; the factor `a` of Innocenti, Pollini and Bracci
+        2006, section 3.
     danger_factors
-        The same on the way to and from some hot spots, by name: the report sets it for a vehicle and a target.
+        The same on the way to and from particular hot spots, by name: the report sets it per vehicle and target.
 
     Raises
     ------
@@ -102,30 +102,30 @@ class HotSpot(Message, frozen=True, kw_only=True):
 
 
 class AssignRequest(Message, frozen=True, kw_only=True):
-    """Who does what: water to share among the masters, and hot spots to treat by the slaves.
+    """A division of work to make: water to share among the masters, and hot spots for the slaves to treat.
 
     Parameters
     ----------
     free
         Where vehicles may go.
     water
-        What legs to and from the free space may cross; absent: they are straight.
+        What legs to and from the free space may cross; without it they are straight.
     vehicles
         The fleet.
     share_free
         Whether the free space is to be shared among the masters, in proportion to the range that their ways leave.
     footprint_m
-        Edge of the triangles that shares are made of; chosen by the stage where it is absent.
+        Edge of the triangles that shares are made of; by default, the stage chooses it.
     hot_spots
         What the slaves treat.
     swath_m
         The width that one pass over a hot spot treats.
     danger_zones
-        What the slaves' routes avoid, as far as that is worth the way.
+        What the slaves' routes avoid, as far as the detour is worth it.
     danger_detour_m
-        The detour that a chance of no harm e times as good is worth.
+        The detour that raising the chance of no harm by a factor of e is worth.
     seed
-        Where clustering starts.
+        Seed of the random start of clustering.
     """
 
     free: Polygon
@@ -149,7 +149,7 @@ class AssignRequest(Message, frozen=True, kw_only=True):
         names = [vehicle.name for vehicle in self.vehicles]
         if len(set(names)) < len(names):
             twice = next(name for name in names if names.count(name) > 1)
-            raise InvalidMission(f"has {twice!r} twice; expected a name of its own for each", where="vehicles")
+            raise InvalidMission(f"has {twice!r} twice; expected a different name for each", where="vehicles")
         if self.hot_spots and self.swath_m is None:
             raise InvalidMission("is missing; hot spots are treated in passes of that width", where="swath_m")
 
@@ -165,7 +165,7 @@ class Share(Message, frozen=True, kw_only=True):
 
 
 class Sortie(Message, frozen=True, kw_only=True):
-    """One journey of a slave: from its start over hot spots, named in order, to its recovery."""
+    """One journey of a slave: from its start over hot spots, listed in order, to its recovery."""
 
     vehicle: str
     path: LineString
@@ -190,30 +190,31 @@ class LeftSpot(Message, frozen=True, kw_only=True):
 
 
 class Assignment(Message, frozen=True, kw_only=True):
-    """Who does what.
+    """The division of work among the vehicles.
 
     Parameters
     ----------
     shares
-        One a master, where the free space was to be shared. Together with what is dropped they are the free space.
+        One per master, if the free space was to be shared. Together with what is dropped they make up the free
+        space.
     imbalance
-        The largest deviation of a share's area from what is due to it, as a part of that. Due to a vehicle is area
-        in proportion to what of its range the way to its share and home leaves.
+        The largest relative deviation of a share's area from its due. The area due to a vehicle is in proportion
+        to the range that remains after the way to its share and home.
     dropped
-        Water that no master can see and be home within its range.
+        Water that no master can survey and still be home within its range.
     sorties
         The first journey of every slave that has one, within its range.
     further
-        Journeys proposed for what these leave: from the start once more.
+        Journeys proposed for what the sorties leave, again from the start.
     left
-        What no journey of its own could treat.
+        Hot spots that not even a journey of their own could treat.
     treated_share
         Of each hot spot's area in the free space, how much the sorties' swaths cover, in order of the request.
     makespan_s
         Duration of the longest sortie.
     joint_gap
-        How much more the sorties cost than a joint optimiser's, as a part of that: 0 where its own are the best,
-        and are taken. None without the optimiser, and where it serves less.
+        How much more the sorties cost than those of a joint optimiser, relative to the latter: 0 where the
+        optimiser's are the best, and are taken. None without the optimiser, and where it serves fewer.
     """
 
     shares: tuple[Share, ...] = ()

@@ -1,4 +1,4 @@
-"""What a vehicle's length goes for: the spacing of legs, the reserve, and the refusal of one that is too short."""
+"""How a vehicle's length is spent: the spacing of legs, the reserve, and the refusal of a length too short."""
 
 from __future__ import annotations
 
@@ -9,25 +9,35 @@ from oxbow.errors import Infeasible
 __all__ = ["LENGTH_RESERVE", "nominal_spacing_m", "too_short"]
 
 LEAST_SPACINGS = 8
-"""A path is so many spacings long at least: a short one leaves much of a large water out, however it runs."""
+"""A path is at least this many spacings long: a short one misses much of a large water, wherever it runs."""
 
 
 def nominal_spacing_m(area_m2: float, length_m: float, least_m: float = 0.0) -> float:
-    """Area / length (Rendas and Li 2016, section 1.2.1.1, step 5), in metres, or the least that is wanted.
+    """Area / length (Rendas and Li 2016, section 1.2.1.1, step 5), in metres, but no less than the least accepted.
 
-    Of a length far too short for the water, what counts is the length: at area / length it would have no legs.
+    Where a length is far too short for the water, the spacing follows from the length alone: at area / length the
+    path would have no legs.
+
+    Parameters
+    ----------
+    area_m2
+        Of the water to cover.
+    length_m
+        What a vehicle may travel; positive.
+    least_m
+        The least spacing that is accepted.
     """
     return max(min(area_m2 / length_m, length_m / LEAST_SPACINGS), least_m)
 
 
 LENGTH_RESERVE = 0.001
-"""Share of a length that no path uses: what the rounding of written positions may add."""
+"""Share of a length that no path uses: rounding of written positions may add as much."""
 
 WELL_USED = 0.95
-"""Share of a length below which a plan says why it does not use more (Rendas and Li 2016: 5 %)."""
+"""A plan that uses less than this share of its length says why (Rendas and Li 2016: 5 %)."""
 
 _STEPS_PER_M = 10
-"""Lengths are told in decimetres: in whole metres, 884 m may be too short for 884 m."""
+"""Lengths are reported in decimetres: in whole metres, 884 m may be too short for 884 m."""
 
 
 def too_short(
@@ -38,9 +48,9 @@ def too_short(
     reserve: float = LENGTH_RESERVE,
     where: str = "Master_length",
 ) -> Infeasible:
-    """The refusal of a length that does not suffice, with what is necessary.
+    """The refusal of a length that does not suffice, with the length that is necessary.
 
-    It may take a little more: how short a way is depends on how finely shores are drawn, and that on the length.
+    A little more may be needed: the shortest way depends on how finely shores are drawn, and that on the length.
 
     Parameters
     ----------
@@ -49,11 +59,16 @@ def too_short(
     shortest_m
         What it would need, without the reserve.
     what
-        What that is the length of.
+        What is that long, for the message.
     reserve
         Share of the length that is kept back.
     where
         The field that the length comes from.
+
+    Returns
+    -------
+    Infeasible
+        To be raised by the caller.
     """
     least_m = math.ceil(_STEPS_PER_M * shortest_m / (1.0 - reserve)) / _STEPS_PER_M
     return Infeasible(

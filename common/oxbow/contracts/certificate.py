@@ -28,7 +28,7 @@ __all__ = [
 
 
 class VariogramModel(enum.StrEnum):
-    """How the values of a field at two places differ, by their distance."""
+    """How the difference of a field's values at two places depends on their distance."""
 
     EXPONENTIAL = "exponential"
     SPHERICAL = "spherical"
@@ -39,9 +39,9 @@ class VariogramModel(enum.StrEnum):
 class Variogram(Message, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A stationary and isotropic model of a field: half the mean squared difference of two places' values.
 
-    It rises from `nugget`, by which places right beside one another differ, to `sill`, by which places far apart
-    do (the nugget included); both are in the squared unit of the field. Within `range_m`, 95 % of that rise is
-    done, in the spherical model all of it. `matern32` is Matern's model of smoothness 3/2.
+    It rises from `nugget`, for places right beside one another, to `sill`, for places far apart (the nugget
+    included); both are in the squared unit of the field. Within `range_m` it has made 95 % of that rise, in the
+    spherical model all of it. `matern32` is Matern's model of smoothness 3/2.
     """
 
     model: VariogramModel
@@ -78,8 +78,8 @@ class CertifyRequest(Track, frozen=True, kw_only=True):
     """A path to judge against the mission itself: the true outline and zones, not the planner's free space.
 
     The paths of a team are judged together: `others` are those of its further vehicles. `areas` are what the paths
-    are to cover where that is not all of the free space: the hot spots of a treatment. Water narrower than
-    `least_width_m` is not to be covered. The probability of harm is told where there are `danger_zones`.
+    are to cover if that is not all of the free space: the hot spots of a treatment. Water narrower than
+    `least_width_m` need not be covered. With `danger_zones`, the probability of harm is reported.
     """
 
     outline: Polygon
@@ -103,7 +103,7 @@ class CertifyRequest(Track, frozen=True, kw_only=True):
 
 
 class Rule(enum.StrEnum):
-    """What a path must keep to, whatever its launch and recovery points make necessary aside."""
+    """What a path must keep to, apart from what its launch and recovery points make necessary."""
 
     CROSSING = "crossing"
     OUTSIDE = "outside"
@@ -131,8 +131,9 @@ class Fault(Message, frozen=True, kw_only=True):
 class Leg(Message, frozen=True, kw_only=True):
     """The stretch of a path next to its launch or recovery point that runs nearer to the shore than Safety.
 
-    `unsafe_m` metres of it do, `ashore_m` of these over land. The point itself makes `least_ashore_m` and about
-    `most_unsafe_m` necessary: it lies so far from the water, and its way to open water may be so long.
+    `unsafe_m` metres of it do, `ashore_m` of these over land. The position of the point makes
+    `least_ashore_m` and about `most_unsafe_m` necessary: the one is its distance from the water, the other the
+    most that its way to open water may take.
     """
 
     unsafe_m: float
@@ -145,7 +146,7 @@ class Leg(Message, frozen=True, kw_only=True):
 
 
 class Conformance(Message, frozen=True, kw_only=True):
-    """What there is of a path, and whether it keeps the rules; defined in `docs/quality.md`.
+    """The size of a path, and whether it keeps the rules; defined in `docs/quality.md`.
 
     `danger` is the probability of harm on the way, None where there are no danger zones. `legs` are those of the
     launch and of the recovery; there are none in plans of earlier versions.
@@ -166,16 +167,16 @@ class Conformance(Message, frozen=True, kw_only=True):
 
 
 class Measures(Conformance, frozen=True, kw_only=True):
-    """How good a path is against what is possible; the measures are defined in `docs/quality.md`.
+    """How good a path is, compared with what is possible; the measures are defined in `docs/quality.md`.
 
     Of several paths, `duration_s` is that of the longest, figures of the rules are sums, `danger` is the
     probability that any of them comes to harm, and coverage is that of all of them together.
 
     `cover_radius_m` are certified (low, high) bounds of the largest distance from a point of the free space to
     the path (report, section 1.2.1, MinMax); `least_radius_m` is the least any path of that length could reach.
-    The kriging variances, shares of the sill, are there where a variogram is. `least_leg_distance_m` (MaxMin) is
-    None where no two legs are parallel, the discrepancy where the path keeps outside the free space; and all that
-    may be None is so in plans of earlier versions.
+    The kriging variances, as shares of the sill, are given if there is a variogram. `least_leg_distance_m`
+    (MaxMin) is None where no two legs are parallel, the discrepancy where the path stays outside the free space;
+    whatever may be None is None in plans of earlier versions.
     """
 
     components: int
@@ -209,8 +210,8 @@ class Certificate(Measures, frozen=True, kw_only=True):
     """The measures of a path, and the place of the free space that is farthest from it.
 
     `tracks` are the figures of each path, where there are several. `faults` are the rules that paths break.
-    `request_digest` is that of the request (`oxbow.wire.codec.digest`), so that a certificate cannot be taken for
-    that of another path or another water.
+    `request_digest` is that of the request (`oxbow.wire.codec.digest`), so that a certificate cannot be mistaken
+    for that of another path or another water.
     """
 
     request_digest: str

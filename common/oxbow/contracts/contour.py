@@ -40,8 +40,8 @@ class ContourRequest(Message, frozen=True, kw_only=True):
     derived from `safety_m` and `spacing_m`.
 
     `places` are the starts and recoveries of all vehicles. The first decides which water is planned on; without
-    any it is the largest. Each lies at most `shore_tolerance_m` from water that can be planned on. Water narrower
-    than `least_width_m` is none; by default all water counts.
+    any, it is the largest. Each lies at most `shore_tolerance_m` from water that can be planned on. Water narrower
+    than `least_width_m` does not count; by default all water counts.
     """
 
     outline: Polygon
@@ -65,7 +65,7 @@ class FreeSpace(Message, frozen=True, kw_only=True):
     """Where a vehicle may go.
 
     `free` is one polygon (islands are holes), valid, and inside the true outline eroded by the safety
-    distance. `water` is the connected true water about it, not eroded and without narrows, that launch and
+    distance. `water` is the connected true water around it, not eroded and without narrows, which launch and
     recovery legs may cross.
     """
 

@@ -1,4 +1,4 @@
-"""Danger zones, which more than one stage is told of: routes avoid them, and paths are judged by them."""
+"""Danger zones, which more than one stage receives: routes avoid them, and paths are judged by them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from oxbow.errors import InvalidMission, renamed
 __all__ = ["DANGER_DETOUR_M", "DangerZone", "Per"]
 
 DANGER_DETOUR_M = 1_000.0
-"""The detour that a chance of no harm e times as good is worth, where nobody says otherwise."""
+"""The detour that raising the chance of no harm by a factor of e is worth, by default."""
 
 
 class Per(enum.StrEnum):
@@ -29,13 +29,14 @@ class DangerZone(Message, frozen=True, kw_only=True):
     Parameters
     ----------
     name
-        What errors call it.
+        Its name in errors.
     area
         Its outline; a boat on the outline is outside.
     probability
         Of harm, 0 <= probability < 1, for each metre inside or for each crossing.
     per
-        Which of the two. A crossing lasts from where a route enters the area, or starts in it, to where it leaves.
+        Which of these two. A crossing lasts from where a route enters the area, or starts in it, to where it
+        leaves.
 
     Raises
     ------

@@ -108,7 +108,7 @@ class Decomposition(Message, frozen=True, kw_only=True):
         self._require_ends()
 
     def _require_ends(self) -> None:
-        """Every cell begins and ends at its critical points, or they are of another heading or water."""
+        """Check that each cell begins and ends at its critical points: others are of another heading or water."""
         if not self.cells:
             return
         x, y = np.array([point.place for point in self.critical_points]).T

@@ -1,4 +1,4 @@
-"""Ids that come from outside and go into keys and file names: short, and of characters that mean nothing there."""
+"""Ids from outside that go into keys and file names: short, and without characters that have a meaning there."""
 
 from __future__ import annotations
 
@@ -16,7 +16,14 @@ _ID = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]*")
 
 
 def checked_id(text: str, where: str = "id") -> str:
-    """`text`, if it may stand as one chunk of a key expression, and in the name of a file.
+    """`text`, if it is fit for one chunk of a key expression and for the name of a file.
+
+    Parameters
+    ----------
+    text
+        An id from outside.
+    where
+        The field that it comes from, for the error.
 
     Raises
     ------

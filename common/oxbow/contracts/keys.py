@@ -1,4 +1,4 @@
-"""Key expressions: they stand here and nowhere else."""
+"""All key expressions: no other module spells one."""
 
 from __future__ import annotations
 
@@ -32,7 +32,20 @@ ANY_LIVE = f"{PREFIX}/live/*/*"
 
 
 def live_key(service: str, instance: str) -> str:
-    """The liveliness token of one process of a service; stages and other services alike."""
+    """The liveliness token of one process of a service.
+
+    Parameters
+    ----------
+    service
+        A stage, or another service such as `mission`.
+    instance
+        One process of it.
+
+    Raises
+    ------
+    InvalidMission
+        One of them is not accepted (`checked_id`).
+    """
     return f"{PREFIX}/live/{checked_id(service)}/{checked_id(instance)}"
 
 
@@ -43,17 +56,32 @@ def live_service(key: str) -> tuple[str, str]:
 
 
 def introspection_key(service: str, instance: str, what: str) -> str:
-    """Where a process of a service tells about itself; `what` is one of `INTROSPECTION`."""
+    """Where a process of a service reports about itself.
+
+    Parameters
+    ----------
+    service
+        A stage, or another service.
+    instance
+        One process of it.
+    what
+        One of `INTROSPECTION`; of the supervisor, ``processes``.
+
+    Raises
+    ------
+    InvalidMission
+        `service` or `instance` is not accepted (`checked_id`).
+    """
     return f"{PREFIX}/stage/{checked_id(service)}/{checked_id(instance)}/@{what}"
 
 
 def any_introspection_key(what: str) -> str:
-    """Asks every replica of every stage; `what` is one of `INTROSPECTION`."""
+    """Addresses every replica of every stage; `what` is one of `INTROSPECTION`."""
     return f"{PREFIX}/stage/*/*/@{what}"
 
 
 ANY = "*"
-"""In place of one chunk of a key, matches all."""
+"""Matches any one chunk of a key."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +108,15 @@ class MissionKey:
 
     @classmethod
     def parse(cls, key: str) -> MissionKey:
-        """Take a key apart; the id is as it came, fit for a reply or not."""
+        """Take a key apart.
+
+        The id is not checked, so that a key with a bad one can still be answered.
+
+        Raises
+        ------
+        InvalidMission
+            It is not the key of a mission.
+        """
         match = _MISSION_KEY.fullmatch(key)
         if match is None:
             expected = f"{PREFIX}/mission/{{id}}/{{what}}[/{{revision}}], each one name, number or {ANY}"
@@ -93,7 +129,20 @@ _MISSION_KEY = re.compile(rf"{PREFIX}/mission/([^/]+)/([a-z]+)(?:/([0-9]{{1,9}}|
 
 
 def mission_key(mission_id: str, what: str) -> str:
-    """The key of one mission; ``oxbow/v1/mission/{id}/{what}``."""
+    """The key of one mission: ``oxbow/v1/mission/{id}/{what}``.
+
+    Parameters
+    ----------
+    mission_id
+        One mission.
+    what
+        As in `MissionKey`; also ``cancel``.
+
+    Raises
+    ------
+    InvalidMission
+        The id is not accepted (`checked_id`).
+    """
     return str(MissionKey(checked_id(mission_id), what))
 
 
@@ -101,7 +150,22 @@ PLAN_KEY = f"{PREFIX}/plan"
 
 
 def layer_key(mission_id: str, stage: str, name: str) -> str:
-    """Where a stage's layer of one mission is put."""
+    """Where a stage publishes a layer of one mission.
+
+    Parameters
+    ----------
+    mission_id
+        The mission that was planned.
+    stage
+        The stage that shows the layer.
+    name
+        The layer's name.
+
+    Raises
+    ------
+    InvalidMission
+        One of them is not accepted (`checked_id`).
+    """
     return f"{PREFIX}/layer/{checked_id(mission_id)}/{checked_id(stage)}/{checked_id(name)}"
 
 

@@ -1,4 +1,4 @@
-"""What every message between the processes is, and the checks that messages have in common."""
+"""The base of all messages between processes, and the checks that they have in common."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ __all__ = [
 ]
 
 MOST_SEED = 2**53
-"""JSON readers keep whole numbers up to this exactly."""
+"""JSON readers keep integers up to this exactly."""
 
 LEAST_LENGTH_M = 1e-3
-"""Of lengths and speeds in a mission: what is less is as good as nothing, and shorter than rounding."""
+"""The least length or speed in a mission: anything less is practically zero."""
 
 MOST_LENGTH_M = 1e9
 """More than any vehicle travels: 25 times round the Earth."""
@@ -50,10 +50,27 @@ def require_finite(
     above: float = -math.inf,
     most: float = sys.float_info.max,
 ) -> None:
-    """Check numeric fields of a message: finite, `least` to `most`, strictly above `above`."""
+    """Check that numeric fields of a message are finite and within bounds.
+
+    Parameters
+    ----------
+    message
+        The message to check.
+    fields
+        Names of numeric fields; a field that is None passes.
+    least, most
+        The bounds, themselves accepted.
+    above
+        A lower bound, itself not accepted.
+
+    Raises
+    ------
+    InvalidMission
+        A field is not finite or out of bounds; names the field.
+    """
     for field in fields:
         value = getattr(message, field)
-        # An integer may be too large to become a float, but it compares.
+        # `not`, since NaN compares false. An integer may be too large for `math.isfinite`, but it compares.
         if value is not None and not (least <= value <= most and value > above):
             accepted = f"> {above}" if above > -math.inf else f">= {least}" if least > -math.inf else "any"
             bound = "" if most == sys.float_info.max else f", at most {most:g}"
@@ -68,17 +85,42 @@ def _shown(value: float) -> str:
 
 
 def require_area(message: Message, *fields: str) -> None:
-    """Check fields that hold a polygon, several or none: valid, with an area, and within the plane."""
+    """Check fields that hold a polygon, several or none: valid, with an area, and within the plane.
+
+    Parameters
+    ----------
+    message
+        The message to check.
+    fields
+        Names of fields.
+
+    Raises
+    ------
+    InvalidMission
+        A polygon is not of that kind, or a coordinate is not finite or beyond `FARTHEST_M`; names the field.
+    """
     for where, polygon in _geometries(message, fields):
         _require_kind(polygon, Polygon, where)
-        if polygon.is_empty or not shapely.is_valid(
-            polygon
-        ):  # not the property, which keeps the interpreter's lock
+        # The ufunc, not the property: it releases the interpreter's lock while it works.
+        if polygon.is_empty or not shapely.is_valid(polygon):
             raise InvalidMission("is empty or not a valid polygon", where=where)
 
 
 def require_line(message: Message, *fields: str) -> None:
-    """Check fields that hold a line: not empty, and within the plane."""
+    """Check fields that hold a line: not empty, and within the plane.
+
+    Parameters
+    ----------
+    message
+        The message to check.
+    fields
+        Names of fields.
+
+    Raises
+    ------
+    InvalidMission
+        A line is empty, or a coordinate is not finite or beyond `FARTHEST_M`; names the field.
+    """
     for where, line in _geometries(message, fields):
         _require_kind(line, LineString, where)
         if line.is_empty:
@@ -86,20 +128,47 @@ def require_line(message: Message, *fields: str) -> None:
 
 
 def require_place(message: Message, *fields: str) -> None:
-    """Check fields that hold a place or none: within the plane."""
+    """Check fields that hold a place or none: within the plane.
+
+    Parameters
+    ----------
+    message
+        The message to check.
+    fields
+        Names of fields.
+
+    Raises
+    ------
+    InvalidMission
+        A coordinate is not finite or beyond `FARTHEST_M`; names the field.
+    """
     for field in fields:
         if (place := getattr(message, field)) is not None:
             _require_in_plane(place, field)
 
 
 def require_places(message: Message, *fields: str) -> None:
-    """Check fields that hold places: each within the plane."""
+    """Check fields that hold places: each within the plane.
+
+    Parameters
+    ----------
+    message
+        The message to check.
+    fields
+        Names of fields.
+
+    Raises
+    ------
+    InvalidMission
+        A coordinate is not finite or beyond `FARTHEST_M`; names the field and the place.
+    """
     for field in fields:
         for index, place in enumerate(getattr(message, field)):
             _require_in_plane(place, f"{field}[{index}]")
 
 
 def _require_in_plane(place: Place, where: str) -> None:
+    # Not `any(... > FARTHEST_M)`, which NaN would pass.
     if not all(abs(coordinate) <= FARTHEST_M for coordinate in place):
         raise InvalidMission(
             f"is {tuple(place)!r}; expected two finite numbers within {FARTHEST_M:g} m", where=where
@@ -107,7 +176,7 @@ def _require_in_plane(place: Place, where: str) -> None:
 
 
 def _geometries(message: Message, fields: Iterable[str]) -> Iterator[tuple[str, BaseGeometry]]:
-    """The geometries in fields of a message, and what errors call them."""
+    """The geometries in fields of a message, each with its name in errors."""
     for field in fields:
         value = getattr(message, field)
         if isinstance(value, tuple):

@@ -1,4 +1,4 @@
-"""What a DSS is told of its missions, in JSON."""
+"""What a DSS learns about its missions, in JSON."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from oxbow.errors import ErrorReply
 __all__ = ["DEFAULT_DEADLINE_S", "MOST_DEADLINE_S", "MissionState", "MissionStatus"]
 
 DEFAULT_DEADLINE_S = 300.0
-"""Seconds that planning one mission may take, its wait for a free planner not counted: twenty vehicles' worth."""
+"""Seconds that planning one mission may take, without its wait for a free planner: enough for twenty vehicles."""
 
 MOST_DEADLINE_S = 86_400.0
-"""The most that one mission may ask for: a day."""
+"""The most that one mission may request: a day."""
 
 
 class MissionState(enum.StrEnum):
@@ -35,8 +35,8 @@ class MissionStatus(Message, frozen=True, kw_only=True):
     Parameters
     ----------
     mission_id, revision
-        Which request it is about: every new content under one id is a new revision, counted from 1. A request
-        that was refused has revision 0, and nothing is kept of it.
+        The request concerned: each new content under one id is a new revision, counted from 1. A refused request
+        has revision 0, and nothing of it is kept.
     state
         Accepted requests are on disk: each of them ends `done` or `failed`, whatever crashes.
     stage

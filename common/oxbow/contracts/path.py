@@ -42,7 +42,7 @@ class Draw(enum.StrEnum):
 
 
 MOST_WEIGHT = 1e6
-"""Water that is more important than this leaves nothing for the rest."""
+"""Water of a greater weight would leave nothing for the rest."""
 
 
 class WeightedArea(Message, frozen=True, kw_only=True):
@@ -57,12 +57,12 @@ class WeightedArea(Message, frozen=True, kw_only=True):
 
 
 class PathRequest(Message, frozen=True, kw_only=True):
-    """What a path must keep to: the water, its cells, the longest length, the least spacing.
+    """The constraints on a path: the water, its cells, the greatest length, the least spacing.
 
     `weighted_areas` do not overlap, and may reach beyond the water. `time_limit_s` is what may be spent on
     improving the path; without it the work is fixed, and the same request gives the same path everywhere.
-    `smooth` asks for rounded corners. `draw` matters to the space-filling curve alone. `spent_m` is what the
-    vehicle needs on its way to this path and home from it, beside `length_m`: errors speak of both together.
+    `smooth` asks for rounded corners. Only the space-filling curve uses `draw`. `spent_m` is what the vehicle
+    needs on its way to this path and home from it, in addition to `length_m`: errors report the sum of both.
     """
 
     method: Method = Method.SPACE_FILLING_CURVE

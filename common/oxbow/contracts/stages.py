@@ -34,7 +34,15 @@ class Endpoint(Generic[Q, R]):
         return f"{PREFIX}/stage/{self.stage}/{checked_id(instance)}"
 
     def introspection_key(self, instance: str, what: str) -> str:
-        """Where one replica tells about itself; `what` is one of `INTROSPECTION`."""
+        """Where one replica reports about itself.
+
+        Parameters
+        ----------
+        instance
+            One replica.
+        what
+            One of `INTROSPECTION`.
+        """
         return introspection_key(self.stage, instance, what)
 
     def live_key(self, instance: str) -> str:
@@ -43,9 +51,9 @@ class Endpoint(Generic[Q, R]):
 
 
 class Call(Protocol):
-    """Ask a stage: over the bus (`oxbow.bus.client.BusCall`) or in this process (`oxbow.stage.local.LocalCall`).
+    """Calls a stage: over the bus (`oxbow.bus.client.BusCall`) or in this process (`oxbow.stage.local.LocalCall`).
 
-    `part` names the vehicle or the role that is asked about, where a mission has several, for recordings.
+    `part` names the vehicle or the role that the request is about, where a mission has several, for recordings.
     """
 
     def __call__(self, endpoint: Endpoint[Q, R], request: Q, /, *, part: str = "") -> R: ...

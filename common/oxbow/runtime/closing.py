@@ -1,4 +1,4 @@
-"""Objects that are left with `close`."""
+"""Objects that are released with `close`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["Closing"]
 
 
 class Closing(ABC):
-    """Closed at the end of a `with` block."""
+    """An object that a `with` block closes at its end."""
 
     def __enter__(self) -> Self:
         return self
@@ -22,4 +22,4 @@ class Closing(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Leave what is held."""
+        """Release what this object holds."""

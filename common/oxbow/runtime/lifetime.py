@@ -1,4 +1,4 @@
-"""How a process of Oxbow is told to end: SIGTERM, SIGINT, or the death of the process that started it."""
+"""What makes a process of Oxbow end: SIGTERM, SIGINT, or the death of the process that started it."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from types import FrameType
 __all__ = ["Lifetime", "wake_with_parents_death"]
 
 ORPHAN_GRACE_S = 2.0
-"""How long a process may take to end in order once its parent is gone: nobody waits for what it still does."""
+"""How long a process may take for an orderly end once its parent is gone: nobody waits for its work any more."""
 
 _SLICE_S = 0.25
 _PR_SET_PDEATHSIG = 1
 
 
 def wake_with_parents_death() -> None:
-    """Have the death of the parent continue this process where it is stopped (SIGSTOP), on Linux.
+    """Let the death of the parent resume this process if it is stopped (SIGSTOP), on Linux.
 
-    It can then notice that death, and end. A signal that kills would not do: the kernel sends it with the end of
-    the *thread* that started this process, whose other threads may still need it.
+    It can then notice that death, and end. A signal that kills is no alternative: the kernel sends it when the
+    *thread* ends that started this process, and the parent's other threads may still need it.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGCONT)
 
 
 class Lifetime:
-    """Notices when this process should end; made once, in the main thread of a process.
+    """Notices when this process should end; created once, in the main thread of a process.
 
     The first signal asks for an orderly end; a second one exits at once, with status 1.
 
@@ -55,6 +55,7 @@ class Lifetime:
         self._over.set()
 
     def _follow(self, parent: int) -> None:
+        # An orphan gets another parent, at once and on every POSIX system; PR_SET_PDEATHSIG is Linux's alone.
         while os.getppid() == parent:
             time.sleep(_SLICE_S)
         self._over.set()
@@ -62,22 +63,23 @@ class Lifetime:
         _end_at_once()
 
     def end(self) -> None:
-        """End for a reason of one's own."""
+        """End for a reason other than a signal or the parent."""
         self._over.set()
 
     @property
     def over(self) -> bool:
+        """Whether this process should end."""
         return self._over.is_set()
 
     def wait(self, meanwhile: Callable[[], object] = lambda: None) -> None:
         """Return once this process should end; `meanwhile` is called several times a second."""
-        # In slices: a signal that a thread of zenoh's takes does not wake the main thread.
+        # In slices: a signal delivered to one of Zenoh's threads does not wake the main thread.
         while not self._over.wait(_SLICE_S):
             meanwhile()
 
 
 def _end_at_once() -> None:
-    """End, and take along what was started: a group that this process leads has nobody else in it."""
+    """End, along with all child processes: a group that this process leads contains nobody else."""
     if os.getpgrp() == os.getpid():
         os.killpg(0, signal.SIGKILL)
     os._exit(1)

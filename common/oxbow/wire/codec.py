@@ -35,7 +35,7 @@ def _to_wire(value: Any) -> Any:
 
 
 def _from_wire(kind: type, value: Any) -> Any:
-    """What msgspec does not know, or a ValueError, to which msgspec adds the field."""
+    """A value of a type that msgspec does not know; a ValueError is raised again by msgspec with the field."""
     origin = getattr(kind, "__origin__", kind)
     if isinstance(origin, type) and issubclass(origin, BaseGeometry):
         if not isinstance(value, bytes):
@@ -49,10 +49,11 @@ def _from_wire(kind: type, value: Any) -> Any:
 def _array(value: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
     match value:
         case [str(dtype), [*shape], bytes(data)] if dtype == _FLOAT and _is_shape(shape, len(data)):
+            # A view of the message's bytes, and read-only for that, as everything in a message is.
             array = np.frombuffer(data, dtype=_FLOAT).reshape(shape)
         case _:
             raise ValueError(
-                f"is no array; expected ['{_FLOAT}', shape, bytes] with so many bytes as the shape has"
+                f"is no array; expected ['{_FLOAT}', shape, bytes] with as many bytes as the shape has"
             )
     if not np.isfinite(array).all():
         raise ValueError("has elements that are not finite")
@@ -60,6 +61,7 @@ def _array(value: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
 
 
 def _is_shape(shape: list[Any], size: int) -> bool:
+    # Beside a length of 0 the others would go unchecked: hence a bound of each. A bool is an int to `isinstance`.
     if len(shape) > _MOST_DIMENSIONS or not all(type(length) is int and 0 <= length <= size for length in shape):
         return False
     return bool(8 * math.prod(shape) == size)
@@ -74,12 +76,19 @@ def encode(message: msgspec.Struct) -> bytes:
 
 
 def digest(message: msgspec.Struct) -> str:
-    """A digest of a message: equal where its bytes are."""
+    """A digest of a message: equal for equal bytes."""
     return hashlib.sha256(encode(message)).hexdigest()
 
 
 def decode(data: bytes, kind: type[T]) -> T:
     """Decode `data` as a message of type `kind`.
+
+    Parameters
+    ----------
+    data
+        MessagePack, as `encode` makes it.
+    kind
+        The type of message to expect.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What travels beside a request: whose it is, and until when an answer is of use."""
+"""What accompanies a request: the mission that it belongs to, and until when an answer is of use."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from oxbow.wire.waits import MOST_WAIT_S
 __all__ = ["Envelope", "StageError"]
 
 MOST_ENVELOPE_BYTES = 2**16
-"""Far more than one takes: it is read on the network thread."""
+"""Far more than an envelope needs. It is decoded on the network thread, which a large one would hold up."""
 
 
 class Envelope(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -24,22 +24,23 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     Parameters
     ----------
     request_id
-        One for each request; a retry keeps it, so that a stage may answer twice but need not work twice.
+        Unique per request; a retry keeps it, so that a stage may answer twice but need not work twice.
     deadline_s
         Unix time after which nobody waits for the answer; at most seven days ahead.
     mission_id
-        The mission that the request belongs to; without one, the stage shows no layers.
+        The mission that the request belongs to; without it, the stage shows no layers.
     run_id
         The run of that mission: its requests and their layers share it.
     origin
         Latitude and longitude (degrees, WGS84) of the origin of the mission's planar frame.
     part
-        The vehicle or the role that the request is about, where a mission has several: its layers are told apart.
+        The vehicle or the role that the request is about, where a mission has several; it separates their layers.
 
     Raises
     ------
     InvalidMission
-        An id is none (`oxbow.contracts.ids`), a number is not finite or out of bounds, or `part` is too long.
+        An id is not accepted (`oxbow.contracts.ids`), a number is not finite or out of bounds, or `part` is too
+        long.
     """
 
     request_id: str
@@ -68,7 +69,13 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     @classmethod
     def decode(cls, data: bytes) -> Envelope:
-        """Read an envelope; `InvalidMission` where the bytes are none, or too many."""
+        """The envelope that bytes encode.
+
+        Raises
+        ------
+        InvalidMission
+            The bytes are not an envelope, or too many.
+        """
         if len(data) > MOST_ENVELOPE_BYTES:
             raise InvalidMission(f"is {len(data)} bytes; at most {MOST_ENVELOPE_BYTES}", where="attachment")
         return decode_json(data, cls, "attachment")
@@ -79,7 +86,7 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class StageError(ErrorReply, frozen=True, kw_only=True):
-    """An error as a stage replies it (JSON); a reply that is no error has the request's id attached.
+    """An error as a stage replies it (JSON). Replies that are not errors carry the request's id as an attachment.
 
     Parameters
     ----------
@@ -91,4 +98,13 @@ class StageError(ErrorReply, frozen=True, kw_only=True):
 
     @classmethod
     def about(cls, request_id: str, error: ErrorReply) -> StageError:
+        """An error in reply to a request.
+
+        Parameters
+        ----------
+        request_id
+            The request that failed; empty where its id could not be read.
+        error
+            What went wrong.
+        """
         return cls(code=error.code, message=error.message, where=error.where, request_id=request_id)

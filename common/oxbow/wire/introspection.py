@@ -1,4 +1,4 @@
-"""What a replica of a stage tells about itself, beside its instance key (JSON)."""
+"""What a replica of a stage reports about itself, under its instance key (JSON)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Ping(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Info(msgspec.Struct, frozen=True, kw_only=True):
-    """Answer to ``@info``: what runs here."""
+    """Answer to ``@info``: what this process runs."""
 
     stage: str
     instance: str
@@ -33,8 +33,8 @@ class Info(msgspec.Struct, frozen=True, kw_only=True):
 class Stats(msgspec.Struct, frozen=True, kw_only=True):
     """Answer to ``@stats``: counts since the start, and times over the last thousand requests.
 
-    `served` counts all answers but `busy`, `failed` those of them that were errors; `mean_s` and `p95_s` are
-    seconds of work in the worker process, waiting in the queue not included.
+    `served` counts all answers except `busy`, `failed` those among them that were errors; `mean_s` and `p95_s` are
+    seconds of work in the worker process, without the time in the queue.
     """
 
     stage: str
@@ -60,7 +60,7 @@ class Supervised(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Supervision(msgspec.Struct, frozen=True, kw_only=True):
-    """Answer to ``@processes``, by what keeps the processes of a stack running."""
+    """Answer to ``@processes``, from the supervisor that keeps the processes of a stack running."""
 
     stage: str = "supervisor"
     instance: str
@@ -68,7 +68,7 @@ class Supervision(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def rss_bytes(pid: int) -> int:
-    """Resident memory of a process; 0 where the system does not tell."""
+    """Resident memory of a process in bytes; 0 where the system does not report it."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     except OSError:

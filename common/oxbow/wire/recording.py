@@ -1,6 +1,6 @@
-"""What a stage shows of its work: named layers of geometry, put on the bus for whoever draws.
+"""What a stage shows of its work: named layers of geometry, published on the bus for recorders and viewers.
 
-A stage calls `show(Layer(...))`; it neither knows nor waits for a recorder. There is no drawing code here.
+A stage calls `show(Layer(...))`; it neither knows nor waits for a recorder. This module does no drawing.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ class Layer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     Parameters
     ----------
     stage, name
-        Where the layer stands in the recording, e.g. ``contour`` / ``simplified``.
+        The layer's place in the recording, e.g. ``contour`` / ``simplified``.
     step
-        The iteration that it belongs to; layers of one name and rising steps are played one after another.
+        The iteration that it belongs to; layers of one name are played in order of their steps.
     geometries
         Points, lines and polygons in planar metres (of the mission's frame).
     labels, values
-        One a geometry, or none. Values (0..1) colour the geometries on the recorder's scale.
+        One per geometry, or none at all. Values (0..1) colour the geometries on the recorder's scale.
     colour
-        One colour for the whole layer; the recorder's palette where it is absent.
+        One colour for the whole layer; by default, the recorder chooses from its palette.
     nodes, edges
         A graph's node labels and its edges as pairs of node indices; its geometries are the nodes' places.
     scalars
@@ -73,7 +73,7 @@ class Layer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Stamped(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """A layer as it travels on the bus: whose it is, when it was shown, and where its plane lies.
+    """A layer as it travels on the bus: with its mission, the time it was shown, and the origin of its plane.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Stamped(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     time_s
         Unix time at which the stage showed the layer.
     part
-        The vehicle or the role that it is about, where a mission has several.
+        The vehicle or the role that the layer is about, where a mission has several.
     layer
         What was shown.
     """
@@ -100,13 +100,13 @@ class Stamped(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 Show = Callable[[Layer], None]
-"""What a stage is given to show its layers with."""
+"""The function that a stage shows its layers with."""
 
 
 def discard(layer: Layer) -> None:
-    """Show nothing: for a caller that keeps no recording."""
+    """Ignore the layer: for callers without a recording."""
 
 
 def is_watched(show: Show) -> bool:
-    """Whether anybody looks: what is computed for a layer alone may be left out where nobody does."""
+    """Whether layers go anywhere; where they do not, work that only serves a layer may be skipped."""
     return show is not discard

@@ -1,4 +1,4 @@
-"""JSON that comes from outside, decoded into typed structures, with errors that name field and value."""
+"""JSON from outside, decoded into typed structures, with errors that name the field and its value."""
 
 from __future__ import annotations
 
@@ -35,7 +35,14 @@ _BYTE_ORDER_MARKS = {
 
 
 def utf8(data: bytes, name: str) -> bytes:
-    """A text file's content as UTF-8 without a byte order mark; a mark tells in which encoding it came.
+    """A text file's content as UTF-8 without a byte order mark; a mark says in which encoding it came.
+
+    Parameters
+    ----------
+    data
+        The content of the file. Without a byte order mark it is returned as it is, and taken to be UTF-8.
+    name
+        What the file is called in errors.
 
     Raises
     ------
@@ -56,7 +63,7 @@ def utf8(data: bytes, name: str) -> bytes:
 
 
 def decode_json(data: bytes, kind: type[T], name: str, *, at: str = "") -> T:
-    """Decode `data` as `kind`, a type that msgspec can decode; nothing is converted on the way.
+    """Decode `data` as `kind`, a type that msgspec can decode, without any conversion between types.
 
     Parameters
     ----------
@@ -67,13 +74,13 @@ def decode_json(data: bytes, kind: type[T], name: str, *, at: str = "") -> T:
     name
         What the document is called in errors.
     at
-        Where it stands in a larger document: fields in errors are named from there.
+        Its position in a larger document, which the names of fields in errors begin with.
 
     Raises
     ------
     InvalidMission
-        `data` is not JSON (the message tells the line and what stands there) or not of this kind (the
-        error tells the field with its index, its value and what would be accepted).
+        `data` is not JSON (the message gives the line and its text) or not of this kind (the error names the field
+        with its index, its value and what would be accepted).
     """
     try:
         return _decoded(data, kind, name, at)
@@ -91,22 +98,46 @@ def _decoded(data: bytes, kind: type[T], name: str, at: str) -> T:
     try:
         return msgspec.json.decode(data, type=kind)
     except msgspec.ValidationError as error:
-        # What is no JSON further on is said first: no field of it can be told.
+        # A syntax error further on takes precedence: of a document that is not JSON, no field can be quoted.
         msgspec.json.decode(data, type=msgspec.Raw)
         raise _mistyped(str(error), data, kind, name, at) from error
 
 
 def gathered(document: dict[str, msgspec.Raw], known: frozenset[str]) -> dict[str, msgspec.Raw]:
-    """The known fields of a JSON object, less those that are null, and all others together under `extra`."""
+    """The known fields of a JSON object, without those that are null, and all others together under `extra`.
+
+    Parameters
+    ----------
+    document
+        Names and undecoded values of the object's fields.
+    known
+        The names that have a field of their own.
+    """
     fields = {name: raw for name, raw in document.items() if name in known and bytes(raw) != b"null"}
     extra = {name: raw for name, raw in document.items() if name not in known}
     return fields | {EXTRA: msgspec.Raw(msgspec.json.encode(extra))}
 
 
 def gathered_part(data: bytes, kind: type[msgspec.Struct], name: str, *, is_list: bool = False) -> msgspec.Raw:
-    """The JSON of an object, or of a list of objects, as a struct has it that keeps unknown fields in its `extra`.
+    """The JSON of an object, or of a list of objects, for a struct that keeps unknown fields in its `extra`.
 
-    What is neither is left to whoever decodes it.
+    Anything else is returned as it is, and refused when it is decoded.
+
+    Parameters
+    ----------
+    data
+        JSON.
+    kind
+        The struct that it is about to be decoded as.
+    name
+        What the document is called in errors.
+    is_list
+        Whether a list of objects is expected, rather than one object.
+
+    Raises
+    ------
+    InvalidMission
+        `data` begins like such an object or list, and is not JSON; or an element of the list is no object.
     """
     if not data.startswith(b"[" if is_list else b"{"):
         return msgspec.Raw(data)
@@ -118,19 +149,19 @@ def gathered_part(data: bytes, kind: type[msgspec.Struct], name: str, *, is_list
 
 
 def document_of(value: msgspec.Struct) -> dict[str, Any]:
-    """The JSON object of a struct that keeps unknown fields in its `extra`; what is None is left out."""
+    """The JSON object of a struct that keeps unknown fields in its `extra`; fields that are None are left out."""
     fields = {name: getattr(value, field) for field, name in json_names(type(value)).items()}
     extra: dict[str, Any] = getattr(value, EXTRA)
     return {name: field for name, field in fields.items() if field is not None} | extra
 
 
 def json_names(kind: type[msgspec.Struct]) -> dict[str, str]:
-    """What each field is called in JSON, but for `extra`."""
+    """The name of each field in JSON, except `extra`."""
     return {field.name: field.encode_name for field in msgspec.structs.fields(kind) if field.name != EXTRA}
 
 
 def _located(problem: str, data: bytes) -> str:
-    """The problem with its line and the text that stands there, in place of a byte offset."""
+    """The problem with its line and the text around it, in place of a byte offset."""
     match = _BYTE.search(problem)
     if match is None:
         return problem
@@ -161,7 +192,7 @@ def _steps(path: str) -> Iterator[re.Match[str]]:
 
 
 def _text_at(path: str, data: bytes) -> str:
-    """The JSON text of the value that stands at `path`, shortened."""
+    """The JSON text of the value at `path`, shortened."""
     raw = msgspec.Raw(data)
     try:
         for step in _steps(path):

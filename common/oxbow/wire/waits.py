@@ -1,4 +1,4 @@
-"""Seconds that come from outside and become a wait: finite, and within what clocks and operating systems take."""
+"""Waits that come from outside: finite, and within what clocks and operating systems accept."""
 
 from __future__ import annotations
 
@@ -11,7 +11,20 @@ MOST_WAIT_S = 7 * 86_400.0
 
 
 def checked_wait(seconds: float, where: str) -> float:
-    """`seconds`, if one may wait so long; `InvalidMission` where it is no number from 0 to `MOST_WAIT_S`."""
+    """`seconds`, if that is how long one may wait.
+
+    Parameters
+    ----------
+    seconds
+        How long to wait.
+    where
+        The field that it comes from, for the error.
+
+    Raises
+    ------
+    InvalidMission
+        It is not a number from 0 to `MOST_WAIT_S`.
+    """
     if not 0.0 <= seconds <= MOST_WAIT_S:
         raise InvalidMission(f"is {seconds!r} s; expected 0 to {MOST_WAIT_S:g} s", where=where)
     return seconds

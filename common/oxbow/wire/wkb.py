@@ -1,8 +1,8 @@
 """Planar geometry as Well-Known Binary (OGC 06-103r4, section 8), checked before GEOS sees it.
 
-GEOS ends the process on collections that are nested deeply, so that nothing that comes from outside is handed to
-it before its types and counts have been read here. What is accepted is what Oxbow's own processes write: points,
-lines and polygons in two dimensions, and sets of one of these kinds.
+GEOS crashes the process on deeply nested collections, so nothing from outside is handed to it before this module
+has checked types and counts. It accepts what Oxbow's own processes write: points, lines and polygons in two
+dimensions, and sets of one of these kinds.
 """
 
 from __future__ import annotations
@@ -60,13 +60,13 @@ def from_wkb(data: bytes, kind: type[BaseGeometry]) -> BaseGeometry:
     data
         WKB.
     kind
-        What to expect; with `BaseGeometry` any kind, which may be empty.
+        The kind to expect; with `BaseGeometry` any kind, which may also be empty.
 
     Raises
     ------
     ValueError
-        The bytes are no WKB of this kind, are too many, or leave some over; the geometry has rings that are not
-        closed, is empty, or has coordinates that are not finite or beyond `FARTHEST_M`.
+        The bytes are not WKB of this kind, or too many, or some are left over; or the geometry has rings that are
+        not closed, is empty, or has coordinates that are not finite or beyond `FARTHEST_M`.
     """
     if len(data) > MOST_WKB_BYTES:
         raise ValueError(f"has {len(data)} bytes; expected at most {MOST_WKB_BYTES}")
@@ -103,6 +103,8 @@ def _end(data: bytes, start: int, accepted: frozenset[int]) -> int:
         return _end_of_vertices(data, position, order, count)
     if number == _Type.POLYGON:
         return _end_of_rings(data, position, order, count)
+    # Members are never sets themselves, which bounds the depth. A count cannot be trusted, but each turn reads
+    # bytes or fails, so that the work is bounded by the size of the data.
     for _ in range(count):
         position = _end(data, position, _MEMBERS[_Type(number)])
     return position
@@ -122,6 +124,7 @@ def _end_of_vertices(data: bytes, position: int, order: str, count: int) -> int:
     if end > len(data):
         raise ValueError(f"is WKB that ends too early: {count} vertices do not fit")
     coordinates = np.frombuffer(data, f"{order}f8", 2 * count, position)
+    # Not `> FARTHEST_M`, of which NaN is no case either.
     if not (np.abs(coordinates) <= FARTHEST_M).all():
         raise ValueError(f"has coordinates that are not finite, or beyond {FARTHEST_M:g} m")
     return end

@@ -7,10 +7,10 @@ W_P = sum(c_k) + c_MAX (L log(a) - log(1 - P_P)).
 
 Departure: in this module W_P = sum(c_k) - c_MAX a log(1 - P_P). The report's term L log(a) counts edges, dangerous
 or not: it depends on how a route is divided, and sends a vehicle of large a through a zone wherever the way round
-it has more edges: the less fit vehicle goes where the fitter one does not. As a factor of the hazard -log(1 -
-P_k), a acts where danger is and nowhere else: one crossing counts for a vehicle of factor a as a crossings for one
-of factor 1. Of two cheapest routes, that for the larger a never has the greater P_P: W_P is a length plus a times
-a hazard, and what minimises such a sum has the less of a term the more that counts.
+it has more edges: the less fit vehicle goes where the fitter one does not. As a factor of the hazard
+-log(1 - P_k), a acts where danger is and nowhere else: one crossing counts for a vehicle of factor a as a
+crossings for one of factor 1. Of two cheapest routes, that for the larger a never has the greater P_P: W_P is a
+length plus a times a hazard, and what minimises such a sum has the less of a term the more that counts.
 
 Further departures: a zone's probability holds for each metre or for each crossing, and P_k of an edge follows from
 how much of the zone it passes, so that W_P and P_P do not depend on how a route is divided into edges; a zone
