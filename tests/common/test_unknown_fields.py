@@ -21,14 +21,14 @@ def warnings(**fields):
 @pytest.mark.parametrize(
     ("fields", "told"),
     [
-        ({"Saftey": 10.0}, "Saftey has no meaning here and is kept as it came; is Safety meant?"),
+        ({"Saftey": 10.0}, "Saftey is no known field and is kept unchanged; is Safety meant?"),
         ({"safety": 10.0}, "is Safety meant?"),
         ({"Forbidden_Zones": []}, "is ForbiddenZones meant?"),
-        ({"Bloom": BLOOM | {"Sensors": "no3"}}, "Bloom.Sensors has no meaning here"),
-        ({"Vehicles": [{"Name": "a", "Role": "master", "length": 9.0}]}, "Vehicles[0].length has no meaning here"),
+        ({"Bloom": BLOOM | {"Sensors": "no3"}}, "Bloom.Sensors is no known field"),
+        ({"Vehicles": [{"Name": "a", "Role": "master", "length": 9.0}]}, "Vehicles[0].length is no known field"),
         (
             {"DangerZones": [{"Contour": POND, "Danger": 0.1, "per": "metre"}]},
-            "DangerZones[0].per has no meaning here and is kept as it came; is Per meant?",
+            "DangerZones[0].per is no known field and is kept unchanged; is Per meant?",
         ),
     ],
 )

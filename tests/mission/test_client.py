@@ -54,11 +54,11 @@ FALSE: dict[str, tuple[Callable[[Bus, str, bytes], None], str]] = {
     ),
     "a revision that jumps": (
         lambda bus, key, plan: bus.publish(key, forged(plan, revision=99)),
-        "revision 99 is none that is kept so",
+        "revision 99 is not kept with that content",
     ),
     "the next revision, forged": (
         lambda bus, key, plan: bus.publish(key, forged(plan, revision=2)),
-        "revision 2 is none that is kept so",
+        "revision 2 is not kept with that content",
     ),
     "revision 0": (lambda bus, key, plan: bus.publish(key, forged(plan, revision=0)), ""),
 }

@@ -122,7 +122,7 @@ class Client(Closing):
         Returns
         -------
         Mission
-            The completed mission; its `plan` tells id and revision.
+            The completed mission; its `plan` has the id and the revision.
 
         Raises
         ------
@@ -139,6 +139,7 @@ class Client(Closing):
         """
         submission = self._submission(mission, mission_id, timeout_s, options)
         with ExitStack() as stack:
+            # Before the mission is handed in, so that no status is missed.
             if on_status is not None:
                 stack.callback(self._hear_statuses(submission.mission_id, on_status).close)
             return _own_plan(self._ask(PLAN_KEY, submission, timeout_s)[0][1], submission)
@@ -156,7 +157,7 @@ class Client(Closing):
         Parameters
         ----------
         mission, mission_id, options
-            As of `plan`.
+            As in `plan`.
         deadline_s
             Seconds that planning may take.
 
@@ -215,12 +216,25 @@ class Client(Closing):
         history
             Whether to begin with the plans that were made before.
         timeout_s
-            End after so many seconds without an update; never where absent.
+            End after this many seconds without an update; never where absent.
+
+        Returns
+        -------
+        PlanUpdates
+            An iterator that waits for plans, until it or the client is closed.
         """
         return self._updates("plan", mission_id, history, timeout_s)
 
     def replans(self, mission_id: str, *, history: bool = True, timeout_s: float | None = None) -> PlanUpdates:
-        """The plans that take the place of a mission's first one, as `plans` does."""
+        """The plans that take the place of a mission's first one.
+
+        Parameters
+        ----------
+        mission_id
+            The mission.
+        history, timeout_s
+            As in `plans`.
+        """
         return self._updates("replan", mission_id, history, timeout_s)
 
     def _updates(self, what: str, mission_id: str | None, history: bool, timeout_s: float | None) -> PlanUpdates:
@@ -271,7 +285,7 @@ class Client(Closing):
 def _readable_statuses(
     samples: Iterable[tuple[str, bytes]], mission_id: str | None = None
 ) -> Iterator[MissionStatus]:
-    """Statuses, of one mission where given; what is none is logged and passed over."""
+    """Statuses, of one mission where given; a sample that is no status is logged and passed over."""
     for key, payload in samples:
         try:
             yield read_status(payload, mission_id)

@@ -29,7 +29,7 @@ __all__ = ["PlanUpdate", "PlanUpdates", "kept_plan", "read_status"]
 ANSWER_S = 30.0
 """How long the mission service may take to answer what needs no planning."""
 CATCH_UP_S = 5.0
-"""How often it is asked whether there is a plan that was not heard of."""
+"""How often the service is asked whether a plan was missed."""
 LOOK_S = 0.25
 
 _log = logging.getLogger(__name__)
@@ -61,7 +61,20 @@ def kept_plan(payload: bytes) -> PlanUpdate:
 
 
 def read_status(payload: bytes, mission_id: str | None = None) -> MissionStatus:
-    """A status, of one mission where given; `InvalidMission` where it is none."""
+    """The status that a payload holds.
+
+    Parameters
+    ----------
+    payload
+        JSON.
+    mission_id
+        The mission that it must be about; any where absent.
+
+    Raises
+    ------
+    InvalidMission
+        It is no status, or is about another mission.
+    """
     try:
         status = msgspec.json.decode(payload, type=MissionStatus)
     except (msgspec.MsgspecError, ValueError) as error:
@@ -90,7 +103,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
     """Plans as they are made, each once, those of one mission by rising revision; blocks while there is none.
 
     What is put under the key of a plan without being one that the service keeps is logged and passed over. A plan
-    that was not heard of, because the router or the service was away, is found by asking.
+    that was missed, because the router or the service was away, is found by asking.
 
     Iteration ends when it is closed, by whichever thread, or after `timeout_s` without an update.
 
@@ -103,12 +116,12 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
     history
         Whether to begin with those that were made before.
     timeout_s
-        End after so many seconds without an update; never where absent.
+        End after this many seconds without an update; never where absent.
 
     Raises
     ------
     OxbowError
-        The service does not tell what was there before.
+        The service does not answer what was there before.
     """
 
     def __init__(self, bus: Bus, key: MissionKey, *, history: bool, timeout_s: float | None) -> None:
@@ -118,6 +131,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
         self._pending: deque[PlanUpdate] = deque()
         self._live: queue.SimpleQueue[tuple[str, bytes] | None] = queue.SimpleQueue()
         self._seen: dict[str, int] = {}
+        # Some revisions have no plan to see, as those that failed: they must not be asked for at every look.
         self._asked: dict[str, int] = {}
         self._closed = False
         self._links = bus.links
@@ -177,7 +191,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
             self._due_s = time.monotonic() + LOOK_S
             return
         if heard not in self._pending:
-            _log.warning("%s: passed over: revision %d is none that is kept so", key, heard.revision)
+            _log.warning("%s: passed over: revision %d is not kept with that content", key, heard.revision)
 
     # ----------------------------------------------------------------- catching up
 
@@ -207,7 +221,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
             self._is_behind, self._due_s = True, time.monotonic() + LOOK_S
 
     def _catch_up(self) -> None:
-        """Fetch what was not heard of."""
+        """Fetch what was missed."""
         for status in self._statuses():
             mission_id, last = status.mission_id, _last_of(status)
             if last > max(self._seen.get(mission_id, 0), self._asked.get(mission_id, 0)):

@@ -36,8 +36,22 @@ GivenPolygon = Annotated[list[list[GivenPoint]], msgspec.Meta(min_length=1)]
 
 
 def lonlat_of(points: Sequence[Sequence[float]], place: str) -> FloatArray:
-    """Positions in degrees, shape (n, 2), less their heights; `place` is what errors call the list."""
+    """Positions in degrees, shape (n, 2), without their heights.
+
+    Parameters
+    ----------
+    points
+        Longitude and latitude of each, perhaps with a height.
+    place
+        What errors call the list.
+
+    Raises
+    ------
+    InvalidMission
+        A longitude or a latitude is out of range; the error has the position's index.
+    """
     degrees = np.array([point[:2] for point in points], dtype=np.float64).reshape(-1, 2)
+    # A whole turn: longitudes may be counted from -180 or from 0.
     wrong = (np.abs(degrees) > (360.0, 90.0)).any(axis=1)
     if wrong.any():
         index = int(np.argmax(wrong))
@@ -52,7 +66,18 @@ def lonlat_of(points: Sequence[Sequence[float]], place: str) -> FloatArray:
 def require_wgs84(crs: Any, place: str = "crs") -> None:
     """GeoJSON is WGS84; files older than RFC 7946 may say otherwise in a `crs` member.
 
-    Accepted are the names of WGS84, in full: as a URN, as a URI, as ``EPSG:4326`` or ``CRS84``.
+    Parameters
+    ----------
+    crs
+        The member; None where there is none. Accepted are the names of WGS84, in full: as a URN, as a URI, as
+        ``EPSG:4326`` or ``CRS84``.
+    place
+        What errors call the member.
+
+    Raises
+    ------
+    InvalidMission
+        It is another system, or cannot be read.
     """
     if crs is None:
         return

@@ -30,7 +30,7 @@ class GivenDangerZone(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NA
     per
         What the probability refers to.
     extra
-        Fields without a meaning here, kept as they came.
+        Unknown fields, kept unchanged.
     """
 
     name: str | None = None

@@ -120,7 +120,7 @@ _PARTS: dict[str, tuple[type[msgspec.Struct], bool]] = {
     "Vehicles": (GivenVehicle, True),
     "DangerZones": (GivenDangerZone, True),
 }
-"""What else may have fields without a meaning here, and whether it is a list of such objects."""
+"""Parts of the file that may have fields unknown here, and whether the part is a list of such objects."""
 
 
 class OutlineName(enum.StrEnum):
@@ -162,7 +162,7 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
     paths
         The path of every vehicle, of a mission that names its vehicles.
     extra
-        Fields without a meaning here, kept as they came.
+        Unknown fields, kept unchanged.
     """
 
     mission_type: MissionType
@@ -314,10 +314,12 @@ def parse_mission(data: bytes) -> Mission:
     if names:
         document["BoundingBox"] = document.pop(names[0])
         document["outline_name"] = msgspec.Raw(msgspec.json.encode(names[0]))
+    # Read apart from the rest: it is GeoJSON, with geometries that msgspec does not know.
     prior = document.pop("PriorModel", None)
     try:
         mission = decode_json(msgspec.json.encode(document), Mission, "Mission File")
     except InvalidMission as error:
+        # Errors use the name that the author used.
         if names == [OutlineName.IN_BOX] and error.where.startswith("BoundingBox"):
             raise InvalidMission(error.message, error.where.replace("BoundingBox", "InBox", 1)) from error
         raise
@@ -348,5 +350,18 @@ def read_mission(path: Path | str) -> Mission:
 
 
 def write_mission(path: Path | str, mission: Mission) -> None:
-    """Replace a Mission File as a whole; on any failure the old one stays as it was (`write_atomically`)."""
+    """Replace a Mission File as a whole; on any failure the old one stays as it was (`write_atomically`).
+
+    Parameters
+    ----------
+    path
+        The file, which need not exist.
+    mission
+        What to write.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written, or is no regular file.
+    """
     write_atomically(Path(path), mission_json(mission))

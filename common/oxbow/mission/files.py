@@ -21,17 +21,25 @@ def read_bytes(path: Path, limit: int) -> bytes:
     Of a pipe, what is written to it until its end; a device, or a pipe that nobody writes to, is refused rather
     than waited for.
 
+    Parameters
+    ----------
+    path
+        A file or a pipe.
+    limit
+        The most bytes to accept.
+
     Raises
     ------
     InvalidMission
         It cannot be read, or holds more than `limit` bytes.
     """
     try:
+        # To open a pipe that has no writer would wait for one otherwise.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         with open(descriptor, "rb") as file:  # noqa: PTH123 - what is open already
             data = _begun(descriptor, str(path))
             os.set_blocking(descriptor, True)
-            data += file.read(limit + 1 - len(data))
+            data += file.read(limit + 1 - len(data))  # one byte more shows that the file is too large
     except OSError as error:
         raise InvalidMission(f"cannot be read: {error.strerror}", where=str(path)) from error
     if len(data) > limit:
@@ -61,6 +69,13 @@ def write_atomically(path: Path, data: bytes) -> None:
     The new content is complete and on the disk before it takes the old one's place. A symbolic link keeps
     pointing to the file it points to, and the file keeps its permissions.
 
+    Parameters
+    ----------
+    path
+        The file, which need not exist; its folder must.
+    data
+        All of its new content.
+
     Raises
     ------
     OSError
@@ -69,6 +84,7 @@ def write_atomically(path: Path, data: bytes) -> None:
     target = path.resolve()
     if target.exists() and not target.is_file():
         raise OSError(f"{path} is not a regular file")
+    # In the same folder: only within one file system is a rename a single step.
     scratch = target.with_name(f".oxbow-{secrets.token_hex(8)}.tmp")
     try:
         with scratch.open("xb") as file:
@@ -86,6 +102,13 @@ def write_atomically(path: Path, data: bytes) -> None:
 def move_into_place(source: Path, target: Path) -> None:
     """Move a file, to another file system too, in one step for those who read the target.
 
+    Parameters
+    ----------
+    source
+        The file to move, which is gone afterwards.
+    target
+        Where it goes; a file there is replaced.
+
     Raises
     ------
     OSError
@@ -100,7 +123,7 @@ def move_into_place(source: Path, target: Path) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make the replacement itself outlive a power cut."""
+    """Make the replacement itself outlive a power cut: a rename changes the folder, which has its own cache."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)

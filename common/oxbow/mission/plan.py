@@ -130,8 +130,8 @@ class PlanRecord(Message, frozen=True, kw_only=True):
 
     It is about the masters' paths, or the slaves' where there is no master; of several paths, lengths are sums,
     `duration_s` is the longest, `spacing_m` the widest, and `heading_deg` is there where they have it in common.
-    `fleet` tells of each vehicle, unless one surveys alone; `treatment` of hot spots; `slave_certificate` is that
-    of the slaves' paths where there are masters too.
+    `fleet` describes each vehicle, unless one surveys alone, and `treatment` the hot spots; `slave_certificate` is
+    that of the slaves' paths where there are masters too.
 
     Transects run along `heading_deg` (clockwise from north). `length_m` is the geodesic length of the
     waypoints as written. The same mission, options and versions give the same plan, unless there was a

@@ -41,11 +41,11 @@ class PriorFeature(msgspec.Struct, frozen=True, kw_only=True):
     geometry
         A Polygon, MultiPolygon, Point or MultiPoint; longitudes and latitudes in WGS84 degrees.
     weight
-        Sampling in this polygon is so many times as important as elsewhere, where the weight is 1.
+        How many times as important sampling is in this polygon as elsewhere, where the weight is 1.
     value
         The field's value here, in the unit of the mission's sensor.
     properties, extra
-        Other properties, and other members of the feature, kept as they came.
+        Other properties, and other members of the feature, kept unchanged.
     """
 
     geometry: BaseGeometry
@@ -99,7 +99,7 @@ class PriorModel(msgspec.Struct, frozen=True, kw_only=True):
     variogram
         How the field varies from place to place.
     extra
-        Other members of the collection, kept as they came.
+        Other members of the collection, kept unchanged.
     """
 
     features: tuple[PriorFeature, ...] = ()

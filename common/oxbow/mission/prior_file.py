@@ -93,7 +93,7 @@ class _Header:
         return int(self.words[field])
 
     def corner(self, axis: str, cell: float) -> float:
-        """Where the lower left cell's outer corner lies; the header tells that, or the cell's centre."""
+        """Where the lower left cell's outer corner lies; the header gives that, or the cell's centre."""
         centre = f"{axis}llcenter"
         return self.number(centre) - cell / 2 if centre in self.words else self.number(f"{axis}llcorner")
 

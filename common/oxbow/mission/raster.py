@@ -19,7 +19,7 @@ __all__ = ["Raster", "require_size"]
 MAX_CELLS = 250_000
 """Every cell may become a polygon of its own."""
 DIGITS = 3
-"""Weights are rounded to so many significant digits, so that like cells unite."""
+"""Weights are rounded to this many significant digits, so that cells of nearly the same weight unite."""
 DECIMALS = 9
 """Of degrees: a tenth of a millimetre."""
 
@@ -90,7 +90,20 @@ class Raster:
 
 
 def require_size(name: str, rows: int, columns: int) -> None:
-    """Refuse a raster of no cells, or of more than can be planned with, before its cells are read."""
+    """Refuse a raster of no cells, or of more than can be planned with, before its cells are read.
+
+    Parameters
+    ----------
+    name
+        What errors call the raster.
+    rows, columns
+        Its size.
+
+    Raises
+    ------
+    InvalidMission
+        It has no cell, or more than `MAX_CELLS`.
+    """
     if not 0 < rows * columns <= MAX_CELLS:
         raise InvalidMission(
             f"has {rows} x {columns} cells; expected 1 to {MAX_CELLS} (cut it to the site, or take larger cells)",

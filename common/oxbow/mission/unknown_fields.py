@@ -1,4 +1,4 @@
-"""Fields of a Mission File without a meaning that look like one with a meaning: a slip of the pen is told."""
+"""Warnings about unknown fields of a Mission File that look like a known one: most likely a slip of the pen."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from oxbow.wire.strict_json import json_names
 __all__ = ["misspelt"]
 
 ALIKE = 0.75
-"""How much two names have in common, of 1, at least (Ratcliff and Metzener 1988, as `difflib` has it)."""
+"""The least similarity of two names, of 1 (Ratcliff and Metzener 1988, as `difflib` has it)."""
 
 
 def misspelt(mission: Mission) -> tuple[str, ...]:
@@ -40,4 +40,4 @@ def _like(unknown: Iterable[str], known: Iterable[str], prefix: str) -> Iterator
     for field in unknown:
         close = difflib.get_close_matches(field.lower(), names, n=1, cutoff=ALIKE)
         if close:
-            yield f"{prefix}{field} has no meaning here and is kept as it came; is {names[close[0]]} meant?"
+            yield f"{prefix}{field} is no known field and is kept unchanged; is {names[close[0]]} meant?"

@@ -45,7 +45,7 @@ class GivenVehicle(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES
     danger_factors
         The same on the way to and from some hot spots, by the names that plans give them.
     extra
-        Fields without a meaning here, kept as they came.
+        Unknown fields, kept unchanged.
     """
 
     name: str

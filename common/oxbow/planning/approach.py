@@ -34,18 +34,18 @@ APART = 0.1
 HALVINGS = 8
 """How often that distance may be halved until both ways fit."""
 GATES = 48
-"""Places of a share's rim that may be its gate, at most about."""
+"""At most this many places on the rim of a share are tried as its gate."""
 NEAR_GATES = 10.0
-"""Gates of the way out and home that are no farther apart than so many times their legs become one."""
+"""The gates of the way out and home become one where they are within this many leg distances (`apart_m`)."""
 OFF_M = 1e-2
-"""A leg that strays so little from the water stays in it: what the certificate takes for the shore."""
+"""A leg that strays from the water by no more than this stays in it, as in the certificate."""
 OPENING, BESIDE = 0.05, 0.15
 """To each side, the ways out and home open by the first share of the way to the free space, and may run as far
 from it as the second: in a corner of the free space, where they part is outside of it."""
 FAR = 0.25
-"""Legs that take more than this share of a range are told: they are missing where the vehicle surveys."""
+"""Legs that take more than this share of a range are warned about: that length is missing from the survey."""
 SPARE = 1.001
-"""Legs are no more than so many times as long as was computed: where they bend, they are drawn in steps."""
+"""Legs are at most this many times as long as was computed: where they bend, they are drawn in steps."""
 
 
 @dataclass(frozen=True)
@@ -76,19 +76,19 @@ class Approach:
     water: BaseGeometry = field(default_factory=Polygon)
 
     def length_m(self, range_m: float) -> float:
-        """What the legs leave of a range for the share.
+        """The part of a range, in metres, that the legs leave for the share.
 
         Raises
         ------
         Infeasible
-            Nothing: the legs alone are longer.
+            The legs alone are as long as the range, or longer.
         """
         if self._legs_m >= range_m:
             raise too_short(range_m, self._legs_m, what="the way to the vehicle's share and home")
         return range_m - self._legs_m
 
     def warnings(self, range_m: float) -> tuple[str, ...]:
-        """What is to be known of long legs: they leave little to survey with."""
+        """Warnings about long legs, which leave little length for the survey."""
         if self._legs_m <= FAR * range_m:
             return ()
         return (
@@ -135,8 +135,10 @@ class Approach:
             yield _Candidate(out, path, home)
             return
         if self.launch != self.recovery:
+            # Two gates: the middle lines themselves may be clear of each other.
             yield _Candidate(self.out.points, path, self.home.points[::-1])
         line = LineString(path)
+        # From wide to narrow: `joined` takes the first that fits, and legs far apart are the easiest to follow.
         for apart_m in self.apart_m * 0.5 ** np.arange(HALVINGS):
             for side, way in itertools.product((1.0, -1.0), self._ways_round(line, apart_m)):
                 yield _Candidate(self.out.beside(side * apart_m), way, self.home.beside(-side * apart_m)[::-1])
@@ -231,6 +233,18 @@ class Harbour:
     def approach(self, share: Polygon, vehicle: Vehicle) -> Approach:
         """The approach of a vehicle to its share.
 
+        Parameters
+        ----------
+        share
+            The vehicle's part of the free space.
+        vehicle
+            Where it starts and is recovered.
+
+        Returns
+        -------
+        Approach
+            Without legs where the way from either place enters the free space in the share.
+
         Raises
         ------
         Infeasible
@@ -303,6 +317,7 @@ class _Lanes:
 
     @cached_property
     def _inside(self) -> Polygon | MultiPolygon:
+        # Wider than the middle, whose rim then lies well inside: the router need not decide places on its border.
         return self.space.free.buffer(-1.5 * self.apart_m, quad_segs=2)
 
     @cached_property
@@ -374,13 +389,15 @@ def _to_one_gate(out: _Way, home: _Way, recovery: Place) -> _Way:
 def _edge_middles(area: BaseGeometry, most: int) -> FloatArray:
     """Places (n, 2) in the middle of an area's longest edges: a path may begin, end and run along them."""
     xy, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(area)), return_index=True)
+    # The last point of one ring and the first of the next are neighbours here, but no edge.
     edges = np.stack([xy[:-1], xy[1:]], axis=1)[ring[:-1] == ring[1:]]
+    # Stable, so that edges of one length are tried in the same order on every machine.
     longest = np.argsort(-np.hypot(*(edges[:, 1] - edges[:, 0]).T), kind="stable")[:most]
     return np.asarray(edges[longest].mean(axis=1))
 
 
 def _ever_more_beside(leg: FloatArray, apart_m: float) -> FloatArray:
-    """A leg without its first point, moved to its right: by a share of the way so far, and a distance at most."""
+    """A leg without its first point, moved to its right by a share of the way so far, at most by a distance."""
     steps = np.diff(leg, axis=0)
     if len(steps) == 0:
         return leg[:0]
@@ -395,4 +412,5 @@ def _beside(leg: FloatArray, apart_m: float) -> FloatArray:
     """A leg moved to its right; nothing, where it is a place only."""
     if len(leg) < 2:
         return leg[:0]
+    # GEOS offsets to the left where the distance is positive.
     return np.asarray(shapely.get_coordinates(shapely.offset_curve(LineString(leg), -apart_m, quad_segs=2)))

@@ -36,9 +36,10 @@ from oxbow.site.site import Site
 __all__ = ["completed"]
 
 SAME_PLACE_M = 1e-3
+"""A path ends where it should if it ends no farther than this from there: a millimetre."""
 
 LONG_LEG = 2.0
-"""A leg of more than so many safety distances within Safety is warned of: it does not lead straight off."""
+"""A leg with more than this many safety distances within Safety is warned about: it does not lead straight off."""
 
 
 def completed(
@@ -47,6 +48,19 @@ def completed(
     """The mission with its paths and its `Plan`; older paths and an older plan are replaced.
 
     The first and the last waypoint of a path are the positions of its start and recovery exactly as given.
+
+    Parameters
+    ----------
+    mission
+        The mission as it was handed in.
+    options
+        How it was planned.
+    site
+        The mission in planar metres.
+    space
+        The free space that the contour stage gave.
+    teams
+        The plan of each role, in the order of the mission type's roles.
 
     Raises
     ------
@@ -88,6 +102,7 @@ class _Written:
     @classmethod
     def of(cls, plan: VehiclePlan, frame: Frame) -> _Written:
         waypoints = _waypoints(plan.member, plan.path, frame)
+        # The plane distorts lengths a little: it is the geodesic length that a vehicle's range has to cover.
         length_m = geodesic_length_m(lonlat(waypoints))
         if length_m > plan.member.vehicle.length_m:
             raise Internal(
@@ -102,7 +117,7 @@ class _Written:
 
 
 def _paths(mission: Mission, written: Sequence[Sequence[_Written]]) -> dict[str, object]:
-    """The fields that hold the paths: one a role, or `Paths` where the mission names its vehicles."""
+    """The fields that hold the paths: one per role, or `Paths` where the mission names its vehicles."""
     planned = [each for team in written for each in team]
     if mission.vehicles is None:
         own = {each.plan.member.vehicle.role: each.waypoints for each in planned}
@@ -151,7 +166,7 @@ def _team_warnings(mission: Mission, options: PlanOptions, team: TeamPlan) -> tu
 
 
 def _unsafe_legs(mission: Mission, team: TeamPlan) -> Iterator[str]:
-    """What launch and recovery points make necessary: ways over land, and long ones within Safety."""
+    """Warnings about legs that launch and recovery points make necessary: over land, or far within Safety."""
     tracks = team.certificate.tracks or (team.certificate,)
     for plan, track in zip(team.vehicles, tracks, strict=True):
         vehicle = plan.member.vehicle
@@ -166,7 +181,7 @@ def _unsafe_legs(mission: Mission, team: TeamPlan) -> Iterator[str]:
 
 
 def _near_legs(mission: Mission, team: TeamPlan) -> tuple[str, ...]:
-    """Whether the legs of a survey come nearer to one another than the mission wants: water comes before rate."""
+    """A warning where legs of a survey come nearer than Minimal_spatial_rate: covering the water comes first."""
     wanted_m, least_m = mission.minimal_spatial_rate_m, team.certificate.least_leg_distance_m
     if wanted_m is None or least_m is None or least_m >= wanted_m:
         return ()

@@ -65,8 +65,8 @@ class Task:
 def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: Call) -> Mission:
     """Plan a mission's nominal paths and certify them (Rendas and Li 2016, section 1.1).
 
-    Masters survey. Slaves treat the hot spots that the prior model tells; where it tells none, they survey too, as
-    far as their own length goes.
+    Masters survey. Slaves treat the hot spots of the prior model; where it has none, they survey too, as far as
+    their own length goes.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
     Raises
     ------
     OxbowError
-        Whatever a stage raised: nothing is planned by half. `Internal` where a reply does not belong to its
+        Whatever a stage raised: there is no partial plan. `Internal` where a reply does not belong to its
         request, or a path breaks a rule of the water: it is not handed out.
     """
     options = options or PlanOptions()
@@ -113,7 +113,20 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
 
 
 def survey(task: Task, team: Sequence[Member]) -> TeamPlan:
-    """Cover the free space: one vehicle all of it, several a share each."""
+    """Cover the free space: one vehicle all of it, several a share each.
+
+    Parameters
+    ----------
+    task
+        The mission, its site and its free space.
+    team
+        The vehicles that survey, at least one.
+
+    Returns
+    -------
+    TeamPlan
+        One path per vehicle, certified together.
+    """
     if len(team) == 1:
         (member,) = team
         vehicle = member.vehicle
@@ -152,6 +165,7 @@ def treatment(task: Task) -> TeamPlan:
         )
         for sorties in (assignment.sorties, assignment.further)
     )
+    # Further sorties are in no certificate, and this is the only check that they get.
     require_fit_to_follow(task.shore, task.site.frame, further)
     treated = {name for sortie in assignment.sorties for name in sortie.hot_spots}
     areas = tuple(spot.area for spot in task.site.hot_spots if spot.name in treated)
@@ -173,7 +187,7 @@ def expected_calls(mission: Mission) -> int:
 
 
 def _shared(task: Task, team: Sequence[Member]) -> Assignment:
-    """Who surveys does a master's work, and has a share, whatever its role."""
+    """Share the free space out. A vehicle that surveys does a master's work, whatever its role."""
     vehicles = tuple(msgspec.structs.replace(member.vehicle, role=Role.MASTER) for member in team)
     request = AssignRequest(
         free=task.space.free,
@@ -216,7 +230,7 @@ def _covered(task: Task, member: Member, approach: Approach, water_m2: float) ->
 
 
 def _unused(path: LineString, plan: PathPlan, member: Member, length_m: float) -> tuple[str, ...]:
-    """What is to be known of a path that uses its length, while its legs leave much of what was kept for them."""
+    """A warning where legs turn out much shorter than the length kept for them, so that some of it is unused."""
     share = path.length / member.vehicle.length_m
     if share >= WELL_USED or plan.path.length < WELL_USED * length_m:
         return ()
@@ -270,6 +284,7 @@ def _certified(task: Task, vehicles: Sequence[VehiclePlan], areas: tuple[Polygon
         ),
         part=vehicles[0].member.vehicle.role if len(task.mission.mission_type.roles) > 1 else "",
     )
+    # Judged twice: a replica that is old or wrong may certify a path that breaks a rule of this mission's water.
     require_faultless(certificate.faults, task.site.frame, vehicles)
     require_fit_to_follow(task.shore, task.site.frame, vehicles)
     return certificate

@@ -34,7 +34,7 @@ class SubmissionParameters(PlanOptions, frozen=True, kw_only=True, forbid_unknow
         Seconds that planning may take, its wait for a free planner not counted; at most a day.
     client
         Who hands it in, by the name of its liveliness token ``oxbow/v1/live/client/{client}``: clients take turns,
-        and what waits for one that is gone is let go. Those without a name share one.
+        and requests that wait for a client that is gone are dropped. Those without a name count as one client.
     """
 
     id: str | None = None
@@ -53,6 +53,7 @@ class SubmissionParameters(PlanOptions, frozen=True, kw_only=True, forbid_unknow
     def parse(cls, parameters: Mapping[str, str]) -> SubmissionParameters:
         """Read the text of parameters; `InvalidMission` names the one that is unknown or mistyped."""
         try:
+            # Not strict: the parameters of a query are text, those that are numbers as well.
             return msgspec.convert(dict(parameters), cls, strict=False)
         except msgspec.ValidationError as error:
             given = excerpt(";".join(f"{name}={value}" for name, value in parameters.items()))
@@ -83,7 +84,15 @@ class Submission:
 
     @classmethod
     def parse(cls, document: bytes, parameters: Mapping[str, str]) -> Submission:
-        """Read a query's payload, a Mission File in JSON, and its parameters; `InvalidMission` where it cannot."""
+        """Read a query; `InvalidMission` where it cannot be read.
+
+        Parameters
+        ----------
+        document
+            Its payload, a Mission File in JSON.
+        parameters
+            Its parameters as text; see `SubmissionParameters`.
+        """
         return cls(parse_mission(document), SubmissionParameters.parse(parameters))
 
     @cached_property
@@ -96,6 +105,7 @@ class Submission:
     def fingerprint(self) -> str:
         """Equal for two submissions that this version of Oxbow gives the same plan."""
         options = msgspec.structs.replace(self.parameters, id=None, deadline_s=DEFAULT_DEADLINE_S, client="")
+        # A newer Oxbow may plan the same mission otherwise: what an older one planned does not answer for it.
         digest = hashlib.sha256(_version().encode())
         digest.update(msgspec.json.encode(options))
         digest.update(self.document)

@@ -1,4 +1,4 @@
-"""What stages reply, held against what they were asked, before anything is made of it.
+"""The replies of stages, checked against their requests before they are used.
 
 A stage may be an old replica, a wrong one, or one that mixes its answers up. What it replies has to belong to the
 request; and a path leaves only after it has been judged once more here, on the mission's own water.
@@ -51,7 +51,7 @@ Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
 
 EXACT_M = 10 * ROUNDING_M
-"""Places that a reply takes over from its request are as near to them as this."""
+"""Places that a reply takes over from its request may differ by this much."""
 
 
 class CheckedCall:
@@ -78,10 +78,19 @@ class CheckedCall:
 def require_fit_to_follow(shore: Shore, frame: Frame, plans: Sequence[VehiclePlan]) -> None:
     """Judge paths on the mission's own water, whatever is certified of them.
 
+    Parameters
+    ----------
+    shore
+        The water, with the distance to keep from its shore.
+    frame
+        The site's plane, to give places in degrees.
+    plans
+        What to judge.
+
     Raises
     ------
     Internal
-        One breaks a rule; see `require_faultless`.
+        A path breaks a rule; see `require_faultless`.
     """
     for number, plan in enumerate(plans):
         vehicle = plan.member.vehicle
@@ -90,7 +99,16 @@ def require_fit_to_follow(shore: Shore, frame: Frame, plans: Sequence[VehiclePla
 
 
 def require_faultless(faults: Iterable[Fault], frame: Frame, plans: Sequence[VehiclePlan]) -> None:
-    """Refuse to hand out paths of which a fault is known.
+    """Refuse to hand out paths with a known fault.
+
+    Parameters
+    ----------
+    faults
+        What is wrong; the `track` of each is an index into `plans`.
+    frame
+        The site's plane, to give places in degrees.
+    plans
+        The plans that the paths belong to.
 
     Raises
     ------
@@ -149,7 +167,7 @@ def _assignment_faults(request: AssignRequest, reply: Assignment) -> Iterator[st
     spots = {spot.name for spot in request.hot_spots}
     for share in reply.shares:
         if share.vehicle not in vehicles:
-            yield f"a share is that of {share.vehicle!r}, a stranger"
+            yield f"a share is that of {share.vehicle!r}, which takes no part"
         if not _are_in(shapely.get_coordinates(share.area), request.free):
             yield f"the share of {share.vehicle!r} leaves the free space"
     for sortie in (*reply.sorties, *reply.further):
@@ -180,6 +198,7 @@ def _lies_in(area: Polygon, other: Polygon) -> bool:
 
 def _are_in(places: np.ndarray, area: Polygon) -> bool:
     shapely.prepare(area)
+    # Distances cost most, so only places outside are measured: rounding leaves few of them.
     out = places[~shapely.contains_xy(area, places)]
     return bool(shapely.dwithin(area, shapely.points(out), EXACT_M).all())
 

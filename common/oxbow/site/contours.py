@@ -19,7 +19,7 @@ from oxbow.mission.file import Mission
 __all__ = ["MAX_RADIUS_M", "Contour", "Zone", "danger_zones", "forbidden_zones", "require_points"]
 
 MAX_RADIUS_M = 300_000.0
-"""How far a site may reach from the mean of its contour's points, and a launch point may lie from the water."""
+"""How far a site may reach from the mean of its contour's points, and how far a launch point may be from water."""
 MOST_POINTS = 2_000_000
 """Of all contours of a mission; the largest shores of the world have a million."""
 MOST_OWN_CROSSINGS = 10_000
@@ -33,7 +33,7 @@ LEAST_WIDTH_M = 1e-3
 
 @dataclass(frozen=True)
 class Contour:
-    """A contour without its repeated points: `indices` tell where in the Mission File each point stands."""
+    """A contour without its repeated points; `indices` are those of its points in the Mission File."""
 
     name: str
     degrees: FloatArray
@@ -41,7 +41,22 @@ class Contour:
 
     @classmethod
     def of(cls, name: str, positions: Sequence[Position]) -> Contour:
+        """The contour of a field of the Mission File.
+
+        Parameters
+        ----------
+        name
+            The field, for errors.
+        positions
+            Its points in order, closed or not; neighbours may be equal.
+
+        Raises
+        ------
+        InvalidMission
+            Fewer than three points are left without repetitions.
+        """
         degrees = lonlat(positions)
+        # The first point is compared with the last, too: a closed contour keeps one of the two.
         indices = np.flatnonzero((degrees != np.roll(degrees, 1, axis=0)).any(axis=1))
         if len(indices) < 3:
             raise _too_few(name, degrees)
@@ -67,12 +82,12 @@ class Contour:
         Raises
         ------
         InvalidMission
-            It reaches too far, has no area, or meets itself; the error tells where.
+            It reaches too far, has no area, or meets itself; the error says where.
         """
         polygon = self.planar(frame)
         radius_m = np.hypot(*shapely.get_coordinates(polygon).T)
         if radius_m.max() > MAX_RADIUS_M:
-            farthest = int(np.argmax(radius_m[:-1]))
+            farthest = int(np.argmax(radius_m[:-1]))  # the closing point has no index of its own
             raise InvalidMission(
                 f"is {radius_m.max() / 1000:.0f} km from the mean of the points;"
                 f" expected a site that reaches at most {MAX_RADIUS_M / 1000:.0f} km from there",
@@ -129,14 +144,29 @@ def _too_few(name: str, degrees: FloatArray) -> InvalidMission:
 
 @dataclass(frozen=True)
 class Zone:
-    """What a zone's contour stands for: polygons, none of them where it lies outside, and what is to be known."""
+    """The polygons that a zone's contour encloses, none where it lies outside the water, and warnings about it."""
 
     parts: tuple[Polygon, ...] = ()
     warnings: tuple[str, ...] = ()
 
 
 def forbidden_zones(mission: Mission, frame: Frame, outline: Polygon) -> list[Zone]:
-    """A mission's forbidden zones, one by one."""
+    """A mission's forbidden zones, one by one.
+
+    Parameters
+    ----------
+    mission
+        The mission.
+    frame
+        The site's plane.
+    outline
+        The site's contour in that plane, valid.
+
+    Raises
+    ------
+    InvalidMission
+        A zone has no area, or zones meet themselves, one another or the outline too often.
+    """
     contours = [
         Contour.of(f"ForbiddenZones[{index}]", contour) for index, contour in enumerate(mission.forbidden_zones)
     ]
@@ -145,7 +175,17 @@ def forbidden_zones(mission: Mission, frame: Frame, outline: Polygon) -> list[Zo
 
 
 def danger_zones(mission: Mission, frame: Frame, outline: Polygon) -> list[Zone]:
-    """A mission's danger zones, one by one."""
+    """A mission's danger zones, one by one; see `forbidden_zones`.
+
+    Parameters
+    ----------
+    mission
+        The mission.
+    frame
+        The site's plane.
+    outline
+        The site's contour in that plane, valid.
+    """
     contours = [
         Contour.of(f"DangerZones[{index}].Contour", zone.contour)
         for index, zone in enumerate(mission.danger_zones or ())
@@ -192,11 +232,13 @@ class _Zones:
     def _require_few_crossings(self, polygons: Geometries, outline: Polygon) -> None:
         """Refuse zones of which there would be more pieces than memory."""
         edges = Edges.of(np.array([*polygons, outline]))
+        # An outline may have a million edges: only those near a zone can meet one.
         edges = edges.where(edges.within(shapely.total_bounds(polygons)))
         of_zones = edges.ring < len(polygons)
         own, crossings = np.zeros(len(polygons), dtype=int), 0
         for pairs in edges.meetings(of=of_zones):
             one, other = edges.ring[pairs].T
+            # Block by block, so that the refusal comes before the pairs take all memory.
             own += np.bincount(one[one == other], minlength=len(polygons))
             crossings += int((one != other).sum())
             if own.sum() > MOST_OWN_CROSSINGS:

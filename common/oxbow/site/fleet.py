@@ -50,11 +50,11 @@ class Member:
         return self.fields.get(name, name)
 
     def told(self, warning: str) -> str:
-        """A warning, and which vehicle it is about."""
+        """A warning, with the name of the vehicle where the Mission File names its vehicles."""
         return f"{self.vehicle.name}: {warning}" if self.is_named else warning
 
     def named(self) -> AbstractContextManager[None]:
-        """Say of errors which field of the Mission File they are about, and which vehicle it is."""
+        """A context in which errors name this vehicle's fields of the Mission File."""
         return renamed(self.fields)
 
 
@@ -73,7 +73,7 @@ class VehiclePlan:
     hot_spots
         Of a treatment: what it treats, in order.
     dropped, warnings
-        What the path leaves out, and what is to be known of it.
+        What the path leaves out, and warnings about it.
     """
 
     member: Member
@@ -93,7 +93,7 @@ class TeamPlan:
     Parameters
     ----------
     vehicles
-        One a vehicle that leaves its start.
+        One per vehicle that leaves its start.
     certificate
         Of all their paths together.
     assignment
@@ -112,13 +112,21 @@ class TeamPlan:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is to be known of the paths; about which vehicle, where the Mission File names its vehicles."""
+        """Warnings about the paths, with the vehicle's name where the Mission File names its vehicles."""
         of_all = () if self.assignment is None else self.assignment.warnings
         return of_all + tuple(plan.member.told(text) for plan in self.vehicles for text in plan.warnings)
 
 
 def members(mission: Mission, locate: Locate) -> tuple[Member, ...]:
-    """The vehicles of the roles that a mission's type asks for, those of the first role first."""
+    """The vehicles of the roles that a mission's type asks for, those of the first role first.
+
+    Parameters
+    ----------
+    mission
+        The mission.
+    locate
+        Brings the start and the recovery of each to the site's plane.
+    """
     given = mission.vehicles
     if given is None:
         return tuple(_member_of_role(mission, role, locate) for role in mission.mission_type.roles)

@@ -27,7 +27,7 @@ __all__ = ["DOCUMENT", "ImportedMission", "mission_from_geojson"]
 DOCUMENT = "GeoJSON"
 """What errors call the document as a whole."""
 MOST_LISTED = 5
-"""Of several polygons, so many are named, largest first."""
+"""At most this many of several polygons are named in an error, largest first."""
 
 
 class _FeatureKind(enum.StrEnum):
@@ -81,7 +81,7 @@ class _Head(msgspec.Struct):
 
 @dataclass(frozen=True)
 class ImportedMission:
-    """A mission, and what its author should know of how the document was read."""
+    """A mission, and notes for its author on how the document was read."""
 
     mission: Mission
     notes: tuple[str, ...]
@@ -149,6 +149,13 @@ def mission_from_geojson(  # noqa: PLR0913 - one parameter for each field of the
     part
         Which polygon of the document, from 0 in the order in which they stand there; needed where there are
         several. Nothing is chosen silently: a site is one water.
+    launch, recovery, mission_type, bloom, safety_m, length_m, minimal_spatial_rate_m
+        Fields of the mission, `length_m` that of its master; see `oxbow.mission.file.Mission`.
+
+    Returns
+    -------
+    ImportedMission
+        The mission, its geometry checked, with notes on what of the document was passed over or joined.
 
     Raises
     ------
@@ -209,6 +216,7 @@ def _of_feature(feature: _Feature, prefix: str) -> Iterator[_Placed]:
 
 def _single(placed: _Placed) -> Iterator[_Placed]:
     """A geometry, or those of a collection, however deep they stand in it, in their order."""
+    # A stack of our own: collections may be nested deeper than Python recurses.
     waiting = [placed]
     while waiting:
         one = waiting.pop()

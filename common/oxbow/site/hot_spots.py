@@ -20,12 +20,12 @@ from oxbow.site.weights import planar
 __all__ = ["HotSpots", "Overlap", "first_overlap", "hot_spots"]
 
 LEAST_PART = 1e-3
-"""Less of a hot spot than this share is rounding: of what it shares with another, and of what of it is water."""
+"""A smaller share of a hot spot than this is rounding, be it its overlap with another or its part in the water."""
 
 
 @dataclass(frozen=True)
 class HotSpots:
-    """The hot spots of a site, and what its mission's author should know."""
+    """The hot spots of a site, and warnings for its mission's author."""
 
     spots: tuple[HotSpot, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -61,6 +61,11 @@ def hot_spots(
     swath_m
         The width that one pass treats.
 
+    Returns
+    -------
+    HotSpots
+        The hot spots in the water, and a warning about each that lies outside it.
+
     Raises
     ------
     InvalidMission
@@ -76,6 +81,7 @@ def hot_spots(
         if not outline.intersects(geometry):
             warnings.append(f"{where} lies outside the water: it is not treated")
             continue
+        # Hot spots are drawn roughly, and may reach ashore; one that is all on land is a mistake.
         _require_water(geometry, water, frame, where)
         given = shapely.transform(shapely.get_parts(feature.geometry), frame.to_planar)
         areas = _in_order(_areas(geometry, swath_m), given)

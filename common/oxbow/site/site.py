@@ -52,11 +52,11 @@ class Site:
     hot_spots
         What is to be treated.
     danger_zones
-        The danger zones that meet the outline, one a polygon.
+        The danger zones that meet the outline, one per polygon.
     danger_detour_m
         The detour that a chance of no harm e times as good is worth.
     warnings
-        What the mission's author should know.
+        What the mission's author should look at.
     """
 
     frame: Frame
@@ -99,6 +99,7 @@ class Site:
         """
         require_points(mission)
         contour = Contour.of(mission.outline_name, mission.outline)
+        # About the mean of all points: the same contour gives the same plane wherever it begins.
         frame = Frame.around(contour.degrees)
         outline = contour.outline(frame)
         shapely.prepare(outline)
@@ -140,7 +141,7 @@ class Site:
 
 
 def _water(outline: Polygon, zones: Sequence[Polygon]) -> Polygon | MultiPolygon:
-    """The outline less the zones, without what has no area."""
+    """The outline less the zones, without the points and lines that a difference may leave."""
     if not zones:
         return outline
     parts = shapely.get_parts(outline.difference(shapely.union_all(zones)))
@@ -149,7 +150,7 @@ def _water(outline: Polygon, zones: Sequence[Polygon]) -> Polygon | MultiPolygon
 
 
 def _dangerous(mission: Mission, zones: Sequence[Zone]) -> tuple[DangerZone, ...]:
-    """The danger zones as stages are told of them, one a polygon."""
+    """The danger zones as requests to stages have them, one per polygon."""
     return tuple(
         DangerZone(name=given.name or f"DangerZones[{index}]", area=area, probability=given.danger, per=given.per)
         for index, (given, zone) in enumerate(zip(mission.danger_zones or (), zones, strict=True))

@@ -20,7 +20,7 @@ from oxbow.mission.prior import PriorModel
 __all__ = ["planar", "weighted_areas"]
 
 EDGE_DEG = 0.01
-"""Edges are straight in degrees (RFC 7946, section 3.1.1): so short, they are so in the plane, within 2 cm."""
+"""Edges are straight in degrees (RFC 7946, section 3.1.1); this short, they are straight in the plane to 2 cm."""
 MARGIN_DEG = 1e-3
 INTERIORS_MEET = "T********"
 
@@ -57,7 +57,17 @@ def weighted_areas(prior: PriorModel, frame: Frame, outline: Polygon) -> tuple[W
 
 
 def planar(geometry: BaseGeometry, frame: Frame, outline: Polygon) -> BaseGeometry:
-    """A geometry in degrees, in the plane of a site; far from the site's outline, nothing is left of it."""
+    """A geometry, from degrees to the plane of a site; what is far from the site's outline is cut off.
+
+    Parameters
+    ----------
+    geometry
+        In degrees, with longitudes from -180 or from 0.
+    frame
+        The site's plane.
+    outline
+        The site's contour in that plane.
+    """
     near = geometry.intersection(_surroundings(frame, outline))
     return shapely.make_valid(shapely.transform(shapely.segmentize(near, EDGE_DEG), frame.to_planar))
 
@@ -67,8 +77,10 @@ def _surroundings(frame: Frame, outline: Polygon) -> MultiPolygon:
 
     Far from a site its plane is of no use, and longitudes may be counted from -180 or from 0.
     """
+    # Sides that are straight in the plane bulge in degrees: corners alone would give too small a box.
     rim = shapely.segmentize(shapely.envelope(outline), 0.05 * outline.length)
     long, lat = frame.to_degrees(shapely.get_coordinates(rim)).T
+    # Counted from the site's own meridian: one that lies across the antimeridian still has one box.
     long = (long - frame.long + 180.0) % 360.0 - 180.0 + frame.long
     site = box(long.min(), lat.min(), long.max(), lat.max()).buffer(MARGIN_DEG, join_style="mitre")
     return MultiPolygon([translate(site, turn) for turn in (-360.0, 0.0, 360.0)])
