@@ -20,19 +20,26 @@ __all__ = ["handle"]
 def handle(request: AssignRequest, show: Show) -> Assignment:
     """Share the free space among the masters, and the hot spots among the slaves.
 
+    Parameters
+    ----------
+    request
+        What is to be shared among which vehicles.
+    show
+        Takes the layers of the recording.
+
     Raises
     ------
     InvalidMission
-        There is nobody to do what is asked for, hot spots overlap, or a figure is out of proportion.
+        No vehicle has the role that is needed, hot spots overlap, or a number is out of proportion.
     Infeasible
-        A vehicle cannot reach the free space and be home within its range.
+        A vehicle cannot reach the free space and get home within its range.
     """
     # 1. Shares of the free space, each connected.
     reply = _shared(request, show) if request.share_free else Assignment()
     if not request.hot_spots or request.swath_m is None:
         return reply
 
-    # 2. Passes over every hot spot, in parts that fit, shared among the slaves, round after round.
+    # 2. Passes over every hot spot, in parts that fit, assigned to the slaves round after round.
     slaves = _with_role(request.vehicles, Role.SLAVE)
     danger = Danger(request.danger_zones, request.danger_detour_m)
     campaign = plan_campaign(
@@ -46,7 +53,7 @@ def handle(request: AssignRequest, show: Show) -> Assignment:
     )
     first, *others = campaign.schedule.rounds or ((),)
 
-    # 3. What has been planned, measured and shown.
+    # 3. The plan is measured and shown.
     sorties = _sorties(first, campaign)
     further = tuple(sortie for journeys in others for sortie in _sorties(journeys, campaign))
     show_campaign(request.hot_spots, campaign, sorties, further, show)
@@ -79,7 +86,7 @@ def _shared(request: AssignRequest, show: Show) -> Assignment:
 
 
 def _unknown_spots(request: AssignRequest, slaves: Sequence[Vehicle]) -> Iterator[str]:
-    """Danger factors for hot spots that there are not."""
+    """Warnings about danger factors for hot spots that do not exist."""
     names = {spot.name for spot in request.hot_spots}
     for slave in slaves:
         for name in sorted(slave.danger_factors.keys() - names):
@@ -91,7 +98,7 @@ def _with_role(vehicles: Sequence[Vehicle], role: Role) -> tuple[Vehicle, ...]:
 
 
 def _sorties(journeys: Sequence[Journey], campaign: Campaign) -> tuple[Sortie, ...]:
-    """Journeys as messages; a hot spot of which a sortie treats several parts is named once."""
+    """Journeys as messages; a hot spot is named once, even if a sortie treats several parts of it."""
     sorties = []
     for journey in journeys:
         slave = campaign.fleet.slaves[journey.slave]

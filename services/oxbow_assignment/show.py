@@ -16,11 +16,19 @@ __all__ = ["show_campaign", "show_partition", "show_shares"]
 STAGE = "assignment"
 
 MOST_LEGS = 20
-"""So many legs are shown by every method, lest those who look wait for it."""
+"""At most this many routes are shown by every method, so that the viewer need not wait for them."""
 
 
 def show_partition(partition: Partition, show: Show) -> None:
-    """The mesh's edges, and every triangle by its depth in the wavefront of its share."""
+    """Show the mesh's edges, and every triangle by its depth in the wavefront of its share.
+
+    Parameters
+    ----------
+    partition
+        The mesh and its shares.
+    show
+        Takes the layers.
+    """
     mesh, depth = partition.mesh, partition.depth
     corners = np.sort(mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges = map(LineString, mesh.points[np.unique(corners, axis=0)])
@@ -30,7 +38,15 @@ def show_partition(partition: Partition, show: Show) -> None:
 
 
 def show_shares(shares: tuple[Share, ...], show: Show) -> None:
-    """Every master's share."""
+    """Show every master's share.
+
+    Parameters
+    ----------
+    shares
+        What is shown.
+    show
+        Takes the layer.
+    """
     labels = tuple(f"{share.vehicle}: {share.area.area:.0f} m²" for share in shares)
     show(Layer(stage=STAGE, name="shares", geometries=tuple(share.area for share in shares), labels=labels))
 
@@ -42,7 +58,19 @@ def show_campaign(
     further: tuple[Sortie, ...],
     show: Show,
 ) -> None:
-    """Hot spots, danger zones, passes, the clusters of the first round, the routes between, and all sorties."""
+    """Show hot spots, danger zones, passes, clusters of the first round, the routes between, and all sorties.
+
+    Parameters
+    ----------
+    spots
+        All hot spots, those that are not treated among them.
+    campaign
+        Their treatment.
+    sorties, further
+        The sorties of the first round, and of the rounds after it.
+    show
+        Takes the layers.
+    """
     labels = tuple(f"{spot.name}: {spot.value:g}" for spot in spots)
     show(Layer(stage=STAGE, name="hot_spots", geometries=tuple(spot.area for spot in spots), labels=labels))
     if campaign.fleet.danger.zones:

@@ -1,1 +1,1 @@
-"""Treating hot spots: passes, parts, sorties."""
+"""Treatment of hot spots: passes, parts, sorties."""

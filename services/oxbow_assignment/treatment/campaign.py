@@ -1,4 +1,4 @@
-"""Campaign hot spots: passes, parts that fit, sorties, and what is left."""
+"""A campaign over hot spots: passes, parts that fit, sorties, and what is left."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ from oxbow_assignment.treatment.treatment import Treatment, treatment_of
 __all__ = ["Campaign", "plan_campaign"]
 
 NOTED = 0.01
-"""Share of a hot spot outside the free space that is worth a warning."""
+"""The fraction of a hot spot outside the free space from which there is a warning."""
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """Everything that treats some hot spots.
+    """The whole treatment of some hot spots.
 
     Parameters
     ----------
     waters
-        What of each hot spot is in the free space.
+        The part of each hot spot in the free space.
     fleet
         The slaves.
     treatments
         One for each hot spot with water.
     division
-        Their parts, and what is out of reach.
+        Their parts, and the stretches out of reach.
     schedule
         The journeys that treat all parts.
     left
-        Hot spots of which something is left, the best value for its way first.
+        Hot spots of which something is left untreated, the greatest value per metre first.
     """
 
     waters: tuple[BaseGeometry, ...]
@@ -52,11 +52,19 @@ class Campaign:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What whoever reads the sorties should know."""
+        """Warnings about hot spots that lie partly outside the free space."""
         return tuple(_outside_warnings(self.treatments))
 
     def treated_share(self, journeys: Sequence[Journey], swath_m: float) -> tuple[float, ...]:
-        """How much of each hot spot's water lies within half a swath of journeys; 0 where there is no water."""
+        """The fraction of each hot spot's water within half a swath of journeys; 0 where there is no water.
+
+        Parameters
+        ----------
+        journeys
+            Those that count.
+        swath_m
+            The width that one pass treats.
+        """
         return tuple(
             0.0 if water.is_empty else _swaths(journeys, water, swath_m).intersection(water).area / water.area
             for water in self.waters
@@ -64,7 +72,7 @@ class Campaign:
 
 
 def _swaths(journeys: Sequence[Journey], water: BaseGeometry, swath_m: float) -> BaseGeometry:
-    """The swaths of journeys near some water."""
+    """The swaths of journeys near some water; clipped first, so that only what is near is buffered."""
     x0, y0, x1, y1 = water.bounds
     near = [
         shapely.clip_by_rect(journey.path, x0 - swath_m, y0 - swath_m, x1 + swath_m, y1 + swath_m)
@@ -90,30 +98,30 @@ def plan_campaign(
     spots
         What is to be treated.
     slaves
-        Who treats it.
+        The vehicles that treat it; at least one.
     free
         Where they may go.
     swath_m
         The width that one pass treats.
     water
-        What legs to and from the free space may cross; absent: the free space alone.
+        What legs to and from the free space may cross; by default the free space alone.
     danger
         What routes to, between and from hot spots avoid; passes over a hot spot do not.
     seed
-        Where clustering starts.
+        Seed of the clustering.
 
     Raises
     ------
     InvalidMission
-        Hot spots overlap, have one name or no value; there is no slave; the swath is far too small.
+        Hot spots overlap, share a name or have no value; there is no slave; or the swath is far too small.
     Infeasible
-        A slave's range does not suffice to reach the free space and go home.
+        A slave's range is too short to reach the free space and go home, or it would take hundreds of sorties.
     """
     require_treatable(spots)
     shapely.prepare(free)
     fleet = Fleet.of(slaves, free, free if water is None else water, danger)
     found = tuple(waters(spots, free))
-    # From pass to pass there is next to nothing to choose: the funnel's way is the shortest, and found at once.
+    # Between passes there is next to nothing to choose: the funnel finds the shortest way, and at once.
     between_passes = make_router(RouteMethod.FUNNEL, free)
     treatments = tuple(
         treatment_of(spot, water, free, between_passes, swath_m)

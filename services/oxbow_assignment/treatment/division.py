@@ -18,13 +18,13 @@ from oxbow_assignment.treatment.treatment import Treatment
 __all__ = ["Division", "OutOfReach", "Part", "divided"]
 
 LEAST_SPARE = 0.125
-"""The shortest parts of one division, as a share of the range: from farther away, parts are divided further."""
+"""The shortest parts of one division, as a fraction of the range; far from the docks, they are divided further."""
 
 MOST_PARTS = 500
-"""More parts than these are a slip in a range or a swath: nobody puts out to sea so often."""
+"""More parts than this point to a mistake in a range or a swath: no fleet goes out so often."""
 
 LEAST_PART = 0.05
-"""The shortest stretch that is divided further, as a share of the range: for less, nobody puts out to sea."""
+"""The shortest stretch that is divided further, as a fraction of the range: for less, no sortie is worth it."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,11 @@ class Part:
     spot
         The name of its hot spot.
     since, until
-        Where on the treatment's line it begins and ends, as shares of its length.
+        Where on the treatment's line it begins and ends, as fractions of its length.
     line
-        What is travelled, from either end.
+        Its passes, which may be travelled from either end.
     value
-        The hot spot's value, as far as this part treats it.
+        This part's fraction of the hot spot's value.
     """
 
     treatment: int
@@ -59,10 +59,12 @@ class OutOfReach:
 
     Parameters
     ----------
+    part
+        The stretch.
     slave
-        The index of the slave that is nearest to reaching it.
+        The index of the slave that comes nearest to reaching it.
     access_m
-        Metres to it and home for that slave, without the treatment.
+        That slave's way to it and home, without the treatment.
     """
 
     part: Part
@@ -72,19 +74,32 @@ class OutOfReach:
 
 @dataclass(frozen=True)
 class Division:
-    """Parts that one slave at least can treat in a sortie of their own, and the rest."""
+    """Parts that at least one slave can treat in a sortie of their own, and the rest."""
 
     parts: tuple[Part, ...]
     out_of_reach: tuple[OutOfReach, ...]
 
 
 def divided(treatments: Sequence[Treatment], fleet: Fleet) -> Division:
-    """Divide treatments into parts that fit the range of a slave, as few as may be.
+    """Divide treatments into parts that fit the range of a slave, as few as possible.
 
-    A part fits where its length and the way to it and home do, either way round on average. One that does not fit
-    is divided evenly into as many as its distance asks for, and so on. On a line the way there and home changes by
-    no more than twice what is travelled: where even that leaves nothing within reach, nothing is divided further.
-    Where routes go round danger that way changes by more: there, short stretches are tried as well.
+    A part fits if its length and the way to it and home are within range, on average over both directions. One
+    that does not fit is divided evenly into as many parts as its distance asks for, and these again where needed.
+    Along a line, the way there and home changes by no more than twice what is travelled. Where even that leaves
+    nothing within reach, nothing is divided further. Where routes avoid danger, that way may change by more, so
+    short stretches are tried as well.
+
+    Parameters
+    ----------
+    treatments
+        What is divided.
+    fleet
+        The slaves, and their ways.
+
+    Returns
+    -------
+    Division
+        Parts in the order of the treatments and along their lines.
 
     Raises
     ------
@@ -140,7 +155,7 @@ def _evenly(piece: Part, count: int) -> list[Part]:
 
 
 def _stretch(line: LineString, since: float, until: float) -> LineString:
-    """What of a line lies between two shares of its length."""
+    """The stretch of a line between two fractions of its length."""
     stretch = substring(line, since, until, normalized=True)
     assert isinstance(stretch, LineString), "stretches have a length"
     return stretch

@@ -1,9 +1,9 @@
-"""The slaves at sea: where each enters and leaves the free space, and how far treatments lie from there.
+"""The slaves: where each enters and leaves the free space, and how far treatments lie from there.
 
-Where there are danger zones, routes are those of least cost: what danger on the way is worth counts as so many
-metres (M. Innocenti, L. Pollini and A. Bracci 2006, section 3), as many times as the vehicle is less fit for what
-it is sent to. A range is what is travelled: lengths of the same routes, danger or not. A route that starts in a
-zone counts it, and so does the route that led there.
+Where there are danger zones, routes are those of least cost: danger on the way has a price in metres (M.
+Innocenti, L. Pollini and A. Bracci 2006, section 3), times the vehicle's danger factor for what it is sent to. A
+range limits what is travelled: the lengths of the same routes, without the price. A route that starts in a zone
+counts that zone's danger, and so does the route that led there.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from oxbow_assignment.targets.problem import LENGTH
 __all__ = ["Fleet", "Ways"]
 
 MARGIN = 1e-9
-"""Share of each range that is kept back for rounding."""
+"""Fraction of each range that is kept back for rounding."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,8 @@ class Ways:
     Parameters
     ----------
     starts, recoveries : ndarray of shape (2, v, n, 2)
-        From each slave's start, and to its recovery, over its leg ashore if it has one, to both ends of each line.
+        From each slave's start, and to its recovery, to both ends of each line; legs outside the free space
+        included.
     between : ndarray of shape (2, v, n, n, 2, 2)
         From one line's ends to another's, for each slave.
     lengths_m : ndarray of shape (n,)
@@ -46,9 +47,9 @@ class Ways:
     tables
         The routes for each danger factor.
     factors : ndarray of shape (v, p, p)
-        Which of them each slave takes between places: 2 n ends of lines, v docks to set out from, v to come home.
+        The danger factor of each slave between places: 2 n ends of lines, v docks to set out from, v to come home.
     rows : ndarray of int, shape (p,)
-        Each place's number in the tables.
+        Each place's index in the tables.
     """
 
     starts: FloatArray
@@ -61,20 +62,42 @@ class Ways:
 
     @cached_property
     def access_m(self) -> FloatArray:
-        """How far each slave travels to each line and home, either way round on average, shape (v, n)."""
+        """How far each slave travels to each line and home, on average over both directions, shape (v, n)."""
         return np.asarray(self.starts[LENGTH].mean(axis=2) + self.recoveries[LENGTH].mean(axis=2))
 
     def route(self, slave: int, start: int, goal: int) -> LineString:
-        """The route of a slave from one place to another."""
+        """The route of a slave from one place to another.
+
+        Parameters
+        ----------
+        slave
+            Its index.
+        start, goal
+            Places, numbered as in `factors`: end 0 and 1 of line k are 2 k and 2 k + 1.
+        """
         table = self.tables[float(self.factors[slave, start, goal])]
         return LineString(table.polyline(int(self.rows[start]), int(self.rows[goal])))
 
     def out(self, slave: int, end: int) -> LineString:
-        """The route of a slave from where it enters the free space to an end of a line."""
+        """The route of a slave from where it enters the free space to an end of a line.
+
+        Parameters
+        ----------
+        slave
+            Its index.
+        end
+            2 k or 2 k + 1, for the first or last point of line k.
+        """
         return self.route(slave, 2 * len(self.lengths_m) + slave, end)
 
     def home(self, slave: int, end: int) -> LineString:
-        """The route of a slave from an end of a line to where it leaves the free space."""
+        """The route of a slave from an end of a line to where it leaves the free space.
+
+        Parameters
+        ----------
+        slave, end
+            See `out`.
+        """
         return self.route(slave, end, 2 * len(self.lengths_m) + len(self.factors) + slave)
 
 
@@ -91,10 +114,10 @@ class Fleet:
     water
         What their legs may cross.
     danger
-        What is to be avoided there, for a vehicle of factor 1.
+        Danger in the free space, for a vehicle of factor 1.
     out, home
-        A leg for each slave: from its start to the free space, and from there to its recovery (`way_to`); of no
-        length where the point lies in the free space.
+        A leg for each slave: from its start to the free space, and from there to its recovery (`way_to`); of
+        length 0 if the point lies in the free space.
     """
 
     slaves: tuple[Vehicle, ...]
@@ -106,14 +129,25 @@ class Fleet:
 
     @classmethod
     def of(cls, slaves: Sequence[Vehicle], free: Polygon, water: Polygon, danger: Danger = NO_DANGER) -> Fleet:
-        """The slaves, their legs and their routers.
+        """The slaves and their legs.
+
+        Parameters
+        ----------
+        slaves
+            At least one.
+        free
+            Where they may go; prepared.
+        water
+            What their legs may cross.
+        danger
+            What routes through the free space avoid.
 
         Raises
         ------
         InvalidMission
             There is no slave.
         Infeasible
-            A slave's range does not suffice to reach the free space and go home.
+            A slave's range is too short to reach the free space and go home.
         """
         if not slaves:
             raise InvalidMission("has no slave; expected one or more to treat the hot spots", where="vehicles")
@@ -131,12 +165,12 @@ class Fleet:
 
     @cached_property
     def cautious_slaves(self) -> tuple[Vehicle, ...]:
-        """The slaves, with a little less range."""
+        """The slaves with a little less range, so that what is planned for these fits in spite of rounding."""
         return tuple(structs.replace(slave, length_m=slave.length_m * (1.0 - MARGIN)) for slave in self.slaves)
 
     @cached_property
     def lengths_m(self) -> FloatArray:
-        """What a single part may ask of each slave, shape (v,): again a little less."""
+        """The range that a single part may use of each slave, in metres, shape (v,): again a little less."""
         return np.array([slave.length_m * (1.0 - MARGIN) for slave in self.cautious_slaves])
 
     @cached_property
@@ -150,12 +184,13 @@ class Fleet:
         Parameters
         ----------
         lines
-            What is treated.
+            What is treated; at least one.
         spots
-            The hot spot of each line, for slaves that are more or less fit for it; none of them where empty.
+            The name of each line's hot spot, for slaves with a danger factor for it; empty for no names.
         """
         ends = np.array([line.coords[end] for line in lines for end in (0, -1)])
         docks = np.array([leg.coords[-1] for leg in self.out] + [leg.coords[0] for leg in self.home])
+        # Slaves often share their docks: each distinct place is searched from once.
         places, rows = np.unique(np.vstack([ends, docks]), axis=0, return_inverse=True)
         factors = self._factors(spots or [""] * len(lines))
         tables = {factor: self._router(factor).table(places) for factor in np.unique(factors).tolist()}
@@ -181,9 +216,9 @@ class Fleet:
         )
 
     def _factors(self, spots: Sequence[str]) -> FloatArray:
-        """By how much danger counts more for each slave between places, shape (v, p, p): see `Ways.factors`.
+        """The danger factor of each slave between places, shape (v, p, p); see `Ways.factors`.
 
-        A route counts as its ends do: between two hot spots, as that for which the slave is less fit.
+        A route takes the factors of its ends: between two hot spots, the greater one.
         """
         count = 2 * len(spots) + 2 * len(self.slaves)
         if not self.danger.outlines:
@@ -200,7 +235,7 @@ class Fleet:
 
     @cached_property
     def _routers(self) -> dict[float, Router]:
-        """The routers that were asked for, by danger factor."""
+        """The routers that have been needed so far, by danger factor."""
         return {}
 
     def _router(self, factor: float) -> Router:

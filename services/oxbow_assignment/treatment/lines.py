@@ -1,4 +1,4 @@
-"""Lines put together."""
+"""Joining lines."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["joined"]
 
 
 def joined(lines: Sequence[LineString]) -> LineString:
-    """One line along all of some lines, without points that repeat the one before."""
+    """One line along all lines in turn, without points that repeat the one before."""
     points = np.concatenate([shapely.get_coordinates(line) for line in lines])
     repeated = (points[1:] == points[:-1]).all(axis=1)
     return LineString(points[np.concatenate([[True], ~repeated])])

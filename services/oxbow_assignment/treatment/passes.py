@@ -1,4 +1,4 @@
-"""Parallel passes over a region: the fewest metres that treat it, swath beside swath."""
+"""Parallel passes over a region, swath beside swath, in as few metres as possible."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from oxbow.arrays import FloatArray, Indices
 __all__ = ["chord", "parallel_passes", "passes_needed"]
 
 HEADINGS = 4
-"""How many headings are tried, of least width across."""
+"""How many headings are tried: those across which the region is narrowest."""
 
 SWATH_SLACK = 1e-6
-"""Of a swath: a region wider by less needs no further pass."""
+"""Fraction of a swath by which a region may be wider without a further pass, so that rounding makes none."""
 
 NEGLIGIBLE = 1e-3
-"""Share of the region's area that its smallest pieces may make up without a pass of their own."""
+"""Fraction of the region's area that its smallest pieces may make up without a pass of their own."""
 
 ENOUGH = 0.9
-"""A straight pass that treats this share of a missed piece is good enough for it."""
+"""A straight pass that treats this fraction of a missed piece is good enough for it."""
 
 
 def parallel_passes(region: BaseGeometry, free: Polygon, swath_m: float) -> list[LineString]:
     """Passes at most `swath_m` apart, along the heading that needs least length.
 
-    Treatment missions are planned with the geometric planners of maps (Rendas and Li 2016, introduction): here
-    parallel transects. They are fewest along an edge of the convex hull across which the region is narrow (W. H.
-    Huang, 2001). The outermost run half a spacing inside the region's rim, and each reaches from one end to the
-    other of what its band holds of the region.
+    Treatment missions are planned with the geometric planners of mapping missions (Rendas and Li 2016,
+    introduction), in this case parallel transects. They are fewest along an edge of the convex hull across which
+    the region is narrow (W. H. Huang, 2001). The outermost run half a spacing inside the region's rim, and each
+    reaches from one end to the other of the region's part in its band.
 
     Parameters
     ----------
     region
         What is to be treated, inside the free space; one polygon or several.
     free
-        Where passes may run: a pass is interrupted by land.
+        Where passes may run; land interrupts a pass.
     swath_m
         The width that one pass treats.
     """
@@ -50,14 +50,37 @@ def parallel_passes(region: BaseGeometry, free: Polygon, swath_m: float) -> list
 
 
 def passes_needed(region: BaseGeometry, swath_m: float) -> int:
-    """How many swaths beside one another the region is wide, at least."""
+    """The least number of parallel swaths that span the region, at the best heading.
+
+    Parameters
+    ----------
+    region
+        What is to be treated; of positive area.
+    swath_m
+        The width that one pass treats.
+    """
     return max(1, math.ceil(float(_widths_m(region.convex_hull)[1].min()) / swath_m))
 
 
 def chord(piece: Polygon, free: Polygon, swath_m: float) -> list[LineString]:
-    """Passes over a thin piece that parallel passes missed: straight along its middle, or else along its rim."""
+    """Passes over a thin piece that parallel passes missed: straight along its middle, or else along its rim.
+
+    Parameters
+    ----------
+    piece
+        What was missed, inside the free space.
+    free
+        Where passes may run.
+    swath_m
+        The width that one pass treats.
+
+    Returns
+    -------
+    list of LineString
+        Several if land interrupts the pass.
+    """
     box = shapely.get_coordinates(piece.minimum_rotated_rectangle)
-    if len(box) >= 5:
+    if len(box) >= 5:  # else the piece is so thin that its rectangle is a line
         sides = np.hypot(*np.diff(box[:3], axis=0).T)
         ends = (box[[0, 1]] + box[[3, 2]]) / 2 if sides[0] > sides[1] else (box[[0, 3]] + box[[1, 2]]) / 2
         straight = _lines(shapely.intersection(LineString(ends), free))
@@ -68,7 +91,7 @@ def chord(piece: Polygon, free: Polygon, swath_m: float) -> list[LineString]:
 
 
 def _essential(region: BaseGeometry) -> BaseGeometry:
-    """The region without specks that are next to nothing of it."""
+    """The region without specks that are a negligible part of it."""
     parts = shapely.get_parts(region)
     areas = shapely.area(parts)
     order = np.argsort(areas, kind="stable")
@@ -77,7 +100,7 @@ def _essential(region: BaseGeometry) -> BaseGeometry:
 
 
 def _widths_m(hull: BaseGeometry) -> tuple[FloatArray, FloatArray]:
-    """The direction of each edge of a convex polygon, in radians from the x axis, and its width across."""
+    """The direction of each edge of a convex polygon, in radians from the x axis, and the width across it."""
     ring = shapely.get_coordinates(hull)
     edges = np.diff(ring, axis=0)
     edges = edges[np.hypot(*edges.T) > 0.0]
@@ -92,14 +115,14 @@ def _headings(region: BaseGeometry) -> FloatArray:
 
 
 def _stripes(region: BaseGeometry, free: Polygon, swath_m: float, heading: float) -> list[LineString]:
-    """One pass along the middle of each band, wherever the band holds water of the region."""
+    """One pass along the middle of each band, wherever the region has area in it."""
     turn = np.array([[math.cos(heading), -math.sin(heading)], [math.sin(heading), math.cos(heading)]])
     x0, y0, x1, y1 = _bounds(region, turn)
     count = max(1, math.ceil((y1 - y0) / swath_m - SWATH_SLACK))
     floors = y0 + (y1 - y0) / count * np.arange(count)
     ones = np.ones(count)
     bands = shapely.box((x0 - 1.0) * ones, floors, (x1 + 1.0) * ones, floors + (y1 - y0) / count)
-    # The bands turn, and not the region: rings of it that touch would be no valid polygon after rounding.
+    # The bands are turned, not the region: rings of it that touch would make an invalid polygon after rounding.
     bands = shapely.transform(bands, lambda xy: xy @ turn.T)
     pieces, band = shapely.get_parts(shapely.intersection(region, bands), return_index=True)
     flat = shapely.area(pieces) == 0.0
@@ -140,5 +163,5 @@ def _lines(geometry: BaseGeometry) -> list[LineString]:
 
 
 def _length_m(passes: list[LineString], swath_m: float) -> float:
-    """Metres of passes and, about, of the ways from each to the next."""
+    """Metres of passes and, approximately, of the ways between them."""
     return sum(line.length for line in passes) + swath_m * (len(passes) - 1)

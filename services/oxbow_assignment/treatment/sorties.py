@@ -1,4 +1,4 @@
-"""Sorties: who treats which parts in which order, in as many rounds as it takes, and the path of each."""
+"""Sorties: which slave treats which parts in which order, in as many rounds as needed, and the path of each."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from oxbow_assignment.treatment.lines import joined
 __all__ = ["Journey", "Schedule", "scheduled"]
 
 JOINT_MOST = 30
-"""More parts than these are not given to the joint optimiser: it would take longer than all else."""
+"""The joint optimiser is not run on more parts than this: it would take longer than everything else."""
 
 PATIENCE = 100
-"""Of the joint optimiser; for so few parts it finds no better with more."""
+"""Patience of the joint optimiser; with more, it finds nothing better for so few parts."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,9 @@ class Journey:
     parts
         Indices of the parts that it treats, in order.
     path
-        Leg, routes and parts by turns, and the leg home.
+        The leg out, routes and parts in alternation, and the leg home.
     routes
-        Of these, what treats nothing.
+        The routes of the path, which treat nothing.
     """
 
     slave: int
@@ -53,14 +53,14 @@ class Journey:
 
 @dataclass(frozen=True)
 class Schedule:
-    """All journeys that it takes to treat all parts, in rounds: each slave goes once in a round, at most.
+    """The journeys that treat all parts, in rounds; each slave goes out at most once in a round.
 
     Parameters
     ----------
     rounds
         The journeys of each round, in order of the slaves.
     first
-        How the first round was assigned, with its gap to the joint optimiser.
+        The assignment of the first round, with its gap to the joint optimiser; None without parts.
     """
 
     rounds: tuple[tuple[Journey, ...], ...]
@@ -71,17 +71,22 @@ def scheduled(parts: Sequence[Part], fleet: Fleet, *, seed: int = 0) -> Schedule
     """Assign parts to slaves, round after round, so that each round treats as much value as it can.
 
     A part is a target whose two ends are apart. Between parts, the problem counts the mean of the ways from either
-    end of one to either end of the other, and half the length of both. The mean over all ways to turn the parts of
-    a tour round is what the problem counts: the cheapest way costs no more, and the shortest is within range.
+    end of one to either end of the other, and half the length of both. It thus counts a tour as the mean over all
+    ways to orient its parts: the cheapest orientation costs no more, and the shortest is within range.
 
     Parameters
     ----------
     parts
-        Each fits the range of one slave at least.
+        Each fits the range of at least one slave.
     fleet
         The slaves.
     seed
-        Where clustering starts.
+        Seed of the clustering and of the joint optimiser.
+
+    Raises
+    ------
+    Internal
+        A sortie would break a rule, or a part that fits was left: a fault of the planner.
     """
     if not parts:
         return Schedule((), None)
@@ -112,7 +117,7 @@ def _problem(parts: Sequence[Part], fleet: Fleet, ways: Ways, left: Indices) -> 
     between = ways.between[:, :, left[:, None], left].mean(axis=(4, 5))
     figures[:, :, :count, :count] = between + half_m[:, None] + half_m
     starts, recoveries = (of[:, :, left].mean(axis=3) + half_m for of in (ways.starts, ways.recoveries))
-    # No vehicle goes by another one's start or recovery: what is there serves to fill the matrix.
+    # No vehicle passes another one's start or recovery: those entries only fill the matrix.
     access = np.concatenate([starts, recoveries], axis=1)
     figures[:, :, count:, :count] = access[:, None]
     figures[:, :, :count, count:] = access[:, None].swapaxes(2, 3)
@@ -127,7 +132,7 @@ def _problem(parts: Sequence[Part], fleet: Fleet, ways: Ways, left: Indices) -> 
 
 
 def _journey(slave: int, tour: Indices, parts: Sequence[Part], fleet: Fleet, ways: Ways) -> Journey:
-    """The path of one tour, its parts turned the best way, checked."""
+    """The path of one tour with its parts in the best orientation, checked."""
     turns = _turns(slave, tour, ways, fleet.slaves[slave].length_m)
     numbers = tour.tolist()
     lines = [
@@ -138,7 +143,7 @@ def _journey(slave: int, tour: Indices, parts: Sequence[Part], fleet: Fleet, way
     enters = [2 * number + turn for number, turn in zip(numbers, turns, strict=True)]
     routes = [
         ways.out(slave, enters[0]),
-        # Who enters a line at one end leaves it at the other.
+        # A vehicle that enters a line at one end leaves it at the other: `^ 1` is the other end.
         *(ways.route(slave, before ^ 1, after) for before, after in pairwise(enters)),
         ways.home(slave, enters[-1] ^ 1),
     ]
@@ -151,7 +156,8 @@ def _journey(slave: int, tour: Indices, parts: Sequence[Part], fleet: Fleet, way
 def _turns(slave: int, tour: Indices, ways: Ways, range_m: float) -> list[int]:
     """Which parts to travel backwards (1), for the cheapest path within range.
 
-    Where the cheapest is too long, for what is cheapest while metres count some times more; at last, the shortest.
+    If the cheapest path is too long, metres count more and more, until at last the shortest path is taken: that
+    one is within range.
     """
     for weights in ((1.0, 0.0), (1.0, 1.0), (1.0, 10.0), (0.0, 1.0)):
         turns = _best_turns(slave, tour, ways, np.array(weights))
@@ -166,7 +172,7 @@ def _best_turns(slave: int, tour: Indices, ways: Ways, weights: FloatArray) -> l
     so_far = starts[tour[0]]
     came_from: list[Indices] = []
     for before, after in pairwise(tour):
-        # Who enters at one end leaves at the other.
+        # `[::-1]`, since a vehicle that enters at one end leaves at the other.
         longer = so_far[:, None] + np.tensordot(weights, ways.between[:, slave, before, after], 1)[::-1]
         came_from.append(longer.argmin(axis=0))
         so_far = longer.min(axis=0)
@@ -186,7 +192,7 @@ def _length_m(slave: int, tour: Indices, turns: Sequence[int], ways: Ways) -> fl
 
 
 def _require_conforming(path: LineString, fleet: Fleet, slave: int) -> None:
-    """Check that a path is within the slave's range, and but for its legs inside the free space.
+    """Check that a path is within the slave's range and, except for its legs, inside the free space.
 
     Raises
     ------

@@ -16,16 +16,16 @@ from oxbow.site.hot_spots import first_overlap
 __all__ = ["require_treatable", "waters"]
 
 LEAST = 1e-6
-"""A smaller share of a hot spot in the free space is nothing."""
+"""A smaller fraction of a hot spot in the free space counts as none."""
 
 
 def require_treatable(spots: Sequence[HotSpot]) -> None:
-    """Check that names tell hot spots apart, that all are worth something, and that no two overlap.
+    """Check that no two hot spots share a name or overlap, and that all have a value.
 
     Raises
     ------
     InvalidMission
-        Names the hot spots, and the value, or the area that both have in common.
+        Names the hot spots, and the value, or the area in which they overlap.
     """
     for name, count in Counter(spot.name for spot in spots).items():
         if count > 1:
@@ -46,7 +46,20 @@ def require_treatable(spots: Sequence[HotSpot]) -> None:
 
 
 def waters(spots: Sequence[HotSpot], free: Polygon) -> list[BaseGeometry]:
-    """The part of each hot spot in the free space: polygons, empty where there is next to none."""
+    """The part of each hot spot in the free space.
+
+    Parameters
+    ----------
+    spots
+        Hot spots.
+    free
+        The free space.
+
+    Returns
+    -------
+    list of geometries
+        Polygonal, one per hot spot; empty where there is next to no water.
+    """
     cut = [shapely.intersection(spot.area, free) for spot in spots]
     areal = [_areal(geometry) for geometry in cut]
     return [
@@ -56,6 +69,6 @@ def waters(spots: Sequence[HotSpot], free: Polygon) -> list[BaseGeometry]:
 
 
 def _areal(geometry: BaseGeometry) -> BaseGeometry:
-    """The polygons of a geometry, without what touches only."""
+    """The polygons of a geometry, without points and lines where shapes merely touch."""
     parts = shapely.get_parts(geometry)
     return MultiPolygon(parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON].tolist())

@@ -23,22 +23,22 @@ from oxbow_assignment.treatment.passes import chord, parallel_passes, passes_nee
 __all__ = ["COVERED", "Treatment", "treatment_of"]
 
 COVERED = 0.995
-"""Share of a hot spot's water that its passes are to treat."""
+"""The fraction of a hot spot's water that its passes are to treat."""
 
 ROUNDS = 8
-"""How often passes are added for what was missed; three suffice but for the most ragged shapes."""
+"""How often passes are added for what was missed; three suffice for all but the most ragged shapes."""
 
 MOST_PASSES = 1_000
-"""More passes than these over one hot spot are a slip in `swath_m`, not a treatment."""
+"""More passes than this over one hot spot point to a mistake in `swath_m`."""
 
 NEAR = 8
-"""How many near ends of passes each end may be seen from."""
+"""From each end of a pass, sight is checked to this many nearest ends of passes."""
 
 BLOCKED = 3.0
-"""How many times as far as it looks an end counts that land hides."""
+"""An end that land hides counts this many times its straight distance."""
 
 APART = 4.0
-"""What joins two passes costs so many times their greatest distance more: no pass is left half-way."""
+"""A way between passes costs this many times the greatest distance more, so that no pass is left half-way."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Treatment:
 
 
 def treatment_of(spot: HotSpot, water: BaseGeometry, free: Polygon, router: Router, swath_m: float) -> Treatment:
-    """Cover a hot spot with parallel passes, and what they miss at slanted shores and islands with further ones.
+    """Cover a hot spot with parallel passes, and with further ones what these miss at slanted shores and islands.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def treatment_of(spot: HotSpot, water: BaseGeometry, free: Polygon, router: Rout
     free
         Where passes and ways between them run; prepared.
     router
-        Finds ways between passes that do not see each other.
+        Finds ways between passes with land between them.
     swath_m
         The width that one pass treats.
 
@@ -117,8 +117,15 @@ def _further_passes(treated: BaseGeometry, water: BaseGeometry, free: Polygon, s
 def ordered(passes: Sequence[LineString], free: Polygon) -> list[LineString]:
     """The passes in an order, and each in a direction, that makes the ways between them short.
 
-    From each pass to the nearest next one, which goes to and fro over parallel passes; then 2-opt and Or-opt. Ways
-    are as the crow flies, and longer over land.
+    The order goes from each pass to the nearest next one, which runs back and forth over parallel passes; then
+    2-opt and Or-opt improve it. Ways are measured straight, and count more over land.
+
+    Parameters
+    ----------
+    passes
+        In any order and direction.
+    free
+        The free space; prepared.
     """
     if len(passes) < 2:
         return list(passes)
@@ -129,7 +136,17 @@ def ordered(passes: Sequence[LineString], free: Polygon) -> list[LineString]:
 
 
 def linked(passes: Sequence[LineString], free: Polygon, router: Router) -> LineString:
-    """One line along all passes: straight from one to the next where that keeps inside, or by a route."""
+    """One line along all passes, straight from one to the next where that stays inside, or else along a route.
+
+    Parameters
+    ----------
+    passes
+        At least one, in order and direction.
+    free
+        The free space; prepared.
+    router
+        Finds ways between passes with land between them.
+    """
     parts = [passes[0]]
     for before, after in pairwise(passes):
         way = LineString([before.coords[-1], after.coords[0]])
@@ -140,7 +157,7 @@ def linked(passes: Sequence[LineString], free: Polygon, router: Router) -> LineS
 
 
 def _distances(ends: FloatArray, free: Polygon) -> FloatArray:
-    """Distances between ends of passes, shape (2 n, 2 n); near ones that land hides count more."""
+    """Distances between ends of passes, in metres, shape (2 n, 2 n); near ones that land hides count more."""
     apart = np.hypot(*(ends[:, None] - ends[None]).transpose(2, 0, 1))
     near = KDTree(ends).query(ends, k=min(NEAR + 1, len(ends)))[1]
     here = np.repeat(np.arange(len(ends)), near.shape[1])
@@ -159,7 +176,7 @@ def _nearest_next(apart: FloatArray) -> list[int]:
     left[:2] = False
     while left.any():
         start = int(np.where(left, apart[rows[-1]], np.inf).argmin())
-        rows += [start, start ^ 1]
+        rows += [start, start ^ 1]  # `^ 1` is the other end of the same pass
         left[[start, start ^ 1]] = False
     return rows
 
