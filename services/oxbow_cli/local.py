@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
+from oxbow.contracts import STAGES
 from oxbow.stage.local import Handler, LocalCall
 from oxbow.wire.recording import Show, discard
 
@@ -9,18 +12,11 @@ __all__ = ["local_call"]
 
 
 def local_call(show: Show = discard) -> LocalCall:
-    """A call that runs each stage's handler here; the algorithms' imports are paid at this point."""
-    import oxbow_assignment.service  # noqa: PLC0415
-    import oxbow_certificate.service  # noqa: PLC0415
-    import oxbow_contour.service  # noqa: PLC0415
-    import oxbow_decomposition.service  # noqa: PLC0415
-    import oxbow_path.service  # noqa: PLC0415
+    """A call that runs each stage's handler here; the algorithms' imports are paid at this point.
 
+    Stage ``x`` is the package ``oxbow_x``, whose module `service` has the handler: as when it is a process.
+    """
     handlers: dict[str, Handler] = {
-        "contour": oxbow_contour.service.handle,
-        "assignment": oxbow_assignment.service.handle,
-        "decomposition": oxbow_decomposition.service.handle,
-        "path": oxbow_path.service.handle,
-        "certificate": oxbow_certificate.service.handle,
+        endpoint.stage: import_module(f"oxbow_{endpoint.stage}.service").handle for endpoint in STAGES
     }
     return LocalCall(handlers, show)
