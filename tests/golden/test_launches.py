@@ -198,7 +198,7 @@ def test_the_half_of_the_launch_is_planned_and_the_other_named():
     (path,) = require_sound(completed)
     assert completed.plan is not None
     assert [round(part.area_m2, -2) for part in completed.plan.dropped] == [1600]
-    assert any("1 of 15" in text for text in completed.plan.warnings)
+    assert any("dropped 1 part, 15" in text for text in completed.plan.warnings)
     assert path.length < 200.0
 
 
