@@ -40,7 +40,10 @@ MOST_SHOWN_BITS = 64
 
 
 class Message(msgspec.Struct, frozen=True, kw_only=True):
-    """Base of every message on the bus between Oxbow's own processes."""
+    """Base of every message on the bus between Oxbow's own processes.
+
+    A message checks its invariants when it is made, and raises `InvalidMission` with the name of the field.
+    """
 
 
 def require_finite(

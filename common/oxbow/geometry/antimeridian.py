@@ -76,6 +76,7 @@ def _turned(rings: Sequence[FloatArray]) -> Polygon:
 
 def _eastward(long: FloatArray) -> FloatArray:
     turned = long % 360.0
+    # Snapped, both sides of a cut are one line, and a union dissolves it.
     return np.where(np.abs(turned - ANTIMERIDIAN) <= SNAP_DEG, ANTIMERIDIAN, turned)
 
 

@@ -218,6 +218,7 @@ class Shore:
         water = self._parts[np.argmin(shapely.distance(self._parts, path.interpolate(end.open_m)))]
         unsafe_m, ashore_m = _length_m(unsafe), float(water.distance(Point(end.place)))
         direct_m = direct_leg_m(self.safety_m, ashore_m)
+        # The shortest way takes a triangulation: computed only where the direct length does not excuse the leg.
         return Leg(
             unsafe_m=unsafe_m,
             ashore_m=_length_m(outside),

@@ -58,6 +58,7 @@ class Frame:
         lonlat : ndarray of shape (n, 2)
             Longitudes and latitudes in degrees; points on both sides of the antimeridian are fine.
         """
+        # Longitudes are averaged as wrapped differences, which are small across the antimeridian too.
         west = lonlat[:, 0].min()
         # Correctly rounded sums: the same points in another order have the same frame.
         long = west + math.fsum(_wrapped(lonlat[:, 0] - west)) / len(lonlat)

@@ -114,5 +114,6 @@ def _rings(water: Polygon | MultiPolygon) -> tuple[int, int]:
 def _sorted(geometry: BaseGeometry) -> MultiPolygon:
     """The polygons of a geometry that have an area, the largest first."""
     parts: list[Polygon] = [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon)]
+    # Ties are broken by position, so that equal parts have the same order everywhere.
     largest_first = sorted(parts, key=lambda part: (-part.area, part.bounds))
     return MultiPolygon([part for part in largest_first if part.area > 0.0])

@@ -102,6 +102,7 @@ def paired(tails: Indices, heads: Indices) -> tuple[Indices, Indices]:
         Indices into the sides: `one[i]` and `other[i]` run between the same points, either way.
     """
     key = _keys(tails, heads, max(tails.max(initial=0), heads.max(initial=0)) + 1)
+    # At most two sides run between two points, so that equal keys are neighbours once sorted.
     order = np.argsort(key, kind="stable")
     same = np.flatnonzero(key[order[1:]] == key[order[:-1]])
     return order[same], order[same + 1]
@@ -127,6 +128,7 @@ def apexes(triangles: Indices, sides: Indices) -> Indices:
     sides : ndarray of int, shape (k,)
         Numbers of sides.
     """
+    # Corner j + 2 is corner j - 1, and index -1 the last corner.
     return np.asarray(triangles[sides // 3, sides % 3 - 1])
 
 

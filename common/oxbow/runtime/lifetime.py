@@ -50,6 +50,7 @@ class Lifetime:
             threading.Thread(target=self._follow, args=(parent,), name="lifetime", daemon=True).start()
 
     def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
+        # Not sys.exit: the orderly end, which it would join, is what hangs.
         if self._over.is_set():
             os._exit(1)
         self._over.set()

@@ -46,6 +46,11 @@ class Layer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         Named figures of this step (timings in s, lengths in m, ...).
     text
         A line for the log.
+
+    Raises
+    ------
+    ValueError
+        There are some `labels` or `values`, but not one per geometry.
     """
 
     stage: str

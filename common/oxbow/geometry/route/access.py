@@ -92,6 +92,7 @@ def leg_routes(free: BaseGeometry, water: Polygon) -> Routes:
         What legs may cross on their way to the free space.
     """
     clearance_m = float(free.boundary.distance(water.boundary))
+    # At a safety distance of 0 the free space is the water: no leg has narrow water to pass.
     if clearance_m <= ROUNDING_M:
         return Routes(water)
     return Routes(water, max(DETAIL * clearance_m, water.length / MOST_GATES))
@@ -129,5 +130,6 @@ def _way_afloat(area: BaseGeometry, routes: Routes, berth: Place) -> FloatArray:
     route = routes.to_area(np.array(berth), area, routes.goals_in(area))
     if route is None:
         raise Infeasible("lies in water from which no way leads to the free space", "LaunchPoint")
+    # A route to a goal may cross the area before: only the stretch up to the first contact counts.
     outside = shapely.get_parts(route.difference(area))
     return np.asarray(shapely.get_coordinates(outside[np.argmin(shapely.distance(outside, point))]))

@@ -51,7 +51,7 @@ class Gates:
     mesh
         The water; zones' outlines are among its sides.
     danger
-        What danger there is.
+        The danger zones, as they count for one vehicle.
     """
 
     mesh: Mesh

@@ -245,6 +245,7 @@ def taut(route: LineString, water: BaseGeometry) -> LineString:
             ahead = points[kept[-1] + 1 :]
             sights = shapely.linestrings(np.stack([np.broadcast_to(points[kept[-1]], ahead.shape), ahead], axis=1))
             seen = np.flatnonzero(shapely.covers(water, sights))
+            # At least one step on, even out of sight: the route stays as it is where the water ends.
             kept.append(kept[-1] + 1 + int(seen[-1] if len(seen) else 0))
         route = LineString(points[kept])
     return route

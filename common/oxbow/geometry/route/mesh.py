@@ -151,6 +151,7 @@ class Mesh:
 
         A vertex at which shores touch is several places: one for each part of the water around it.
         """
+        # The side after a twin begins where the side itself does: both corners are one place, with water between.
         sides, count = np.flatnonzero(self.twins >= 0), len(self.twins)
         same = coo_array((np.ones(len(sides)), (sides, following(self.twins[sides]))), shape=(count, count))
         return np.asarray(connected_components(same, directed=False)[1], dtype=np.intp)

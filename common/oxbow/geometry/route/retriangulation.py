@@ -73,6 +73,7 @@ def _hole(mesh: Mesh, cavity: Indices, changed: BaseGeometry, site: Site) -> Geo
     pieces = np.asarray(shapely.polygons(mesh.corners[cavity]))
     border = mesh.twins.reshape(-1, 3)[cavity].ravel()
     border = border[(border >= 0) & ~np.isin(border // 3, cavity)]
+    # Sides that were shore are not among them: the shores of after the change come from the site.
     ends = np.stack([mesh.tails[border], mesh.heads[border]], axis=1)
     parts = shapely.get_parts(shapely.geometrycollections([changed, *pieces]))
     lines = np.concatenate([shapely.linestrings(ends), site.shores_near(parts)])
@@ -146,6 +147,8 @@ class _Splice:
 
     def legalised(self) -> Mesh:
         """The constrained Delaunay triangulation that flips lead to; without vertices that no triangle has."""
+        # A flip renumbers the sides of two triangles. A pending number may denote another side afterwards, but all
+        # four sides around a flip become pending, so that none is missed.
         pending = self.suspects.tolist()
         while pending:
             side = pending.pop()

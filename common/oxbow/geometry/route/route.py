@@ -135,7 +135,7 @@ def judged(polyline: FloatArray, mesh: Mesh, danger: Danger, method: RouteMethod
     mesh
         The water.
     danger
-        What danger there is.
+        The danger zones, as they count for one vehicle.
     method
         How the polyline was found.
     """

@@ -148,6 +148,7 @@ def cheapest_ways_to(graph: csr_array[np.float64], goals: Indices) -> WaysTo:
     WaysTo
         Costs and next steps, each of shape (n,).
     """
+    # In the transposed graph, predecessors are the next steps towards a goal.
     costs, following, _ = dijkstra(graph.T.tocsr(), indices=goals, min_only=True, return_predecessors=True)
     return WaysTo(costs, following.astype(np.intp))
 

@@ -93,7 +93,7 @@ class Tessellation:
     mesh
         The water; zones' outlines are among its sides.
     danger
-        What danger there is.
+        The danger zones, as they count for one vehicle.
     side_m
         Side of the lattice's triangles; by default a sixtieth of the longer side of the water's box.
 

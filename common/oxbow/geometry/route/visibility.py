@@ -26,7 +26,7 @@ from oxbow.geometry.triangles import cross, following
 __all__ = ["VisibilityGraph"]
 
 STRAIGHT_RAD = math.pi - 1e-9
-"""A corner of the water at least this wide is one that routes may touch."""
+"""Routes may touch corners of the water that are at least this wide."""
 
 
 EYES = 2**14
@@ -36,7 +36,7 @@ take too much memory."""
 
 @dataclass(frozen=True)
 class VisibilityGraph:
-    """The network of shortest routes, exact but for rounding.
+    """The network of shortest routes, exact except for rounding.
 
     With danger zones, ways are the cheapest of those that bend at corners of the shore and of the zones.
 
@@ -45,7 +45,7 @@ class VisibilityGraph:
     mesh
         The water; zones' outlines are among its sides.
     danger
-        What danger there is.
+        The danger zones, as they count for one vehicle.
     """
 
     mesh: Mesh
@@ -53,7 +53,7 @@ class VisibilityGraph:
 
     @cached_property
     def bends(self) -> Bends:
-        """Where routes can bend."""
+        """The corners where routes can bend."""
         return Bends.of(self.mesh, any_turn=bool(self.danger.outlines))
 
     @property
