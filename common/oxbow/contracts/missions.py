@@ -26,6 +26,7 @@ class MissionState(enum.StrEnum):
 
     @property
     def is_final(self) -> bool:
+        """Whether no other state can follow."""
         return self in (MissionState.DONE, MissionState.FAILED)
 
 

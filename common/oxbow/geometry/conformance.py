@@ -282,6 +282,7 @@ class _Segments:
 
     @classmethod
     def of(cls, path: LineString) -> _Segments:
+        """The segments of a path that have a length."""
         xy = shapely.get_coordinates(path)
         ends = np.stack([xy[:-1], xy[1:]], axis=1)
         # A repeated point makes a segment without a direction, by whose length `at` would divide.
