@@ -1,4 +1,4 @@
-"""Axes that lie along a path or a region: boxes about long oblique segments are mostly empty."""
+"""Axes along a path or a region: in axes that are oblique to it, boxes about long segments are mostly empty."""
 
 from __future__ import annotations
 
@@ -16,22 +16,23 @@ Paths = LineString | MultiLineString
 
 
 def segment_ends(paths: Paths) -> FloatArray:
-    """Both ends (n, 2, 2) of the segments of paths, in order, without those of no length."""
+    """Both ends of the segments of paths, in order, without those of length 0; shape (n, 2, 2)."""
     xy, path = shapely.get_coordinates(shapely.get_parts(paths), return_index=True)
     ends = np.stack([xy[:-1], xy[1:]], axis=1)
     return np.asarray(ends[(path[:-1] == path[1:]) & (ends[:, 0] != ends[:, 1]).any(axis=1)])
 
 
 def main_direction(paths: Paths) -> FloatArray:
-    """The direction (2,) that most of the length of paths runs in: the mean of doubled headings, halved."""
+    """The direction along which most of the length of paths runs, a unit vector of shape (2,)."""
     steps = np.diff(segment_ends(paths), axis=1)[:, 0]
     headings = np.arctan2(steps[:, 1], steps[:, 0])
+    # Doubled, opposite headings are one, so that the legs there and back do not cancel out in the mean.
     half = np.angle(np.sum(np.hypot(*steps.T) * np.exp(2j * headings))) / 2
     return np.array([np.cos(half), np.sin(half)])
 
 
 def long_side(region: BaseGeometry) -> FloatArray:
-    """The direction (2,) of the longer side of the least rectangle about a region."""
+    """The direction of the longer side of the least rectangle about a region, a unit vector of shape (2,)."""
     corners = shapely.get_coordinates(shapely.oriented_envelope(region))
     sides = np.diff(corners[:3], axis=0)
     longer = sides[np.argmax(np.hypot(*sides.T))]
@@ -39,6 +40,14 @@ def long_side(region: BaseGeometry) -> FloatArray:
 
 
 def turned(xy: FloatArray, along: FloatArray) -> FloatArray:
-    """Coordinates (n, 2) along a direction (2,), and to its left."""
+    """Coordinates along a direction and to its left, shape (n, 2).
+
+    Parameters
+    ----------
+    xy
+        Places, shape (n, 2).
+    along
+        A unit vector, shape (2,).
+    """
     east, north = along
     return np.asarray(xy @ np.array([[east, -north], [north, east]]))

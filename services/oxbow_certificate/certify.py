@@ -1,4 +1,4 @@
-"""The certificate of one path or several: every measure of them, from the mission's own water."""
+"""The certificate of one or several paths: all their measures, taken on the mission's own water."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def judge(request: CertifyRequest) -> Judgement:
     """Measure paths against their mission and against the best that their length allows.
 
     A bad path is reported, not refused. Paths that enter no part of the free space are judged on all of it, with a
-    `judged_area` of 0, so that every figure is finite. Several paths cover together; each keeps the rules for
-    itself.
+    `judged_area` of 0, so that every figure is finite. Coverage is that of all paths together; the rules apply to
+    each path.
 
     Raises
     ------
@@ -101,9 +101,9 @@ def _conformance(track: Track, conduct: Conduct, danger: Danger) -> Conformance:
 
 
 def _together(tracks: tuple[Conformance, ...]) -> dict[str, Any]:
-    """Sums of what is counted and measured along the paths; the mission lasts as long as its longest.
+    """Sums of counts and lengths over the paths; the mission lasts as long as its longest path.
 
-    Any of them may come to harm, each on its own: the probabilities of no harm multiply.
+    Vehicles come to harm independently of one another, so the probabilities of no harm multiply.
     """
     sums = {
         name: sum(getattr(track, name) for track in tracks)
@@ -120,7 +120,7 @@ def _together(tracks: tuple[Conformance, ...]) -> dict[str, Any]:
 
 
 def _water(space: JudgedSpace) -> dict[str, Any]:
-    """What there is of water."""
+    """How much water there is, and how much of it is judged."""
     return {
         "components": len(space.free.geoms),
         "free_area_m2": space.asked.area,
@@ -145,7 +145,7 @@ def _coverage(cover: CoverRadius, spread: DistanceSpread, least_m: float) -> dic
 
 
 def _evenness(request: CertifyRequest, paths: Paths, space: JudgedSpace, least_m: float) -> dict[str, Any]:
-    """How evenly the paths sample places and directions; legs are those of one vehicle."""
+    """How evenly the paths sample places and directions; distances of legs are taken within each path."""
     spacing_m = 2.0 * least_m
     margin_m = max(2.0 * request.safety_m, spacing_m)
     apart_m = [
@@ -163,7 +163,7 @@ def _evenness(request: CertifyRequest, paths: Paths, space: JudgedSpace, least_m
 
 
 def _kriging(request: CertifyRequest, paths: Paths, spread: DistanceSpread, least_m: float) -> dict[str, Any]:
-    """How well the field could be told from what the paths sample, where its variogram is known."""
+    """How well the field can be reconstructed from samples along the paths, if its variogram is known."""
     if request.variogram is None:
         return {}
     variance = kriging_variance(paths, spread.places, request.variogram, least_m)

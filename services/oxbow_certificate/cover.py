@@ -18,12 +18,12 @@ from oxbow_certificate.quadtree import Squares
 __all__ = ["CoverRadius", "cover_radius", "least_radius"]
 
 _HOPEFUL = 16
-"""Squares of a level whose nearest place of the region is tried as a lower bound."""
+"""How many squares of a level are tried for a lower bound, by the place of the region nearest to each centre."""
 
 
 @dataclass(frozen=True)
 class CoverRadius:
-    """Bounds of the largest distance from a place of a region to a path; `place` is one that attains `low_m`."""
+    """Bounds of the largest distance from a place of a region to a path; `place` has the distance `low_m`."""
 
     low_m: float
     high_m: float
@@ -31,25 +31,34 @@ class CoverRadius:
 
 
 class Farthest(NamedTuple):
-    """A place and its distance to the path."""
+    """A place, and its distance to the path."""
 
     place: Place
     distance_m: float
 
 
 class FarthestCentres(NamedTuple):
-    """Places (n, 2), the farthest first, and its distance to the path."""
+    """Places, the farthest first, shape (n, 2), and the distance of the farthest to the path."""
 
     places: FloatArray
     distance_m: float
 
 
 def least_radius(area_m2: float, length_m: float, paths: int = 1) -> float:
-    """Least cover radius that paths of a given length in all could reach over a given area, in metres.
+    """The least cover radius that paths of a given total length could reach over a given area, in metres.
 
     The places within r of a connected curve of length L fill no more than 2 r L + pi r^2 (Hotelling 1939), those
     of n curves of that length together no more than 2 r L + n pi r^2, and they must fill the area. This is the
     positive root, in the form that loses no digits where L^2 is far above the area.
+
+    Parameters
+    ----------
+    area_m2
+        The area to be covered, > 0.
+    length_m
+        The length of all paths together.
+    paths
+        The number of paths.
     """
     return area_m2 / (length_m + math.sqrt(length_m**2 + paths * math.pi * area_m2))
 
@@ -59,10 +68,10 @@ def cover_radius(
 ) -> CoverRadius:
     """Bound the largest distance from a place of `region` to a path (Rendas and Li 2016, section 1.2.1, MinMax).
 
-    Distance changes by no more than the way gone (it is 1-Lipschitz), so that over a square it is at most that of
-    the centre plus half the diagonal. Squares whose bound is not above what some place of the region attains are
-    dropped, the others quartered: the method of Shubert (1972) on a quadtree in place of an interval. Most are
-    dropped by the distance to the path's vertices, before that to its segments is asked for.
+    Distance is 1-Lipschitz, so that over a square it is at most that of the centre plus half the diagonal. Squares
+    whose bound is not above the distance of some place of the region are dropped, and the others quartered: the
+    method of Shubert (1972) on a quadtree instead of an interval. Most squares are dropped by their distance to
+    the path's vertices, before that to its segments is computed.
 
     Parameters
     ----------
@@ -71,10 +80,10 @@ def cover_radius(
     distance
         Distance to the path.
     gap
-        The relative gap between the bounds at which the search ends.
+        The relative gap between the bounds at which the search ends, > 0.
     most_squares
-        Squares that may be examined: before there are more, the search ends with the bounds it has, wider than
-        `gap`.
+        The most squares to examine: before there are more, the search ends with the bounds that it has, farther
+        apart than `gap`.
     """
     shapely.prepare(region)
     place, low_m = _farthest(shapely.get_coordinates(region), distance)
@@ -89,6 +98,8 @@ def cover_radius(
         if candidate_m > low_m:
             place, low_m = candidate, candidate_m
         high_m = max(low_m * (1 + gap), hopeful_m + squares.circumradius_m)
+        # The two distances of a place come from trees in different axes: rounding must not drop a square that the
+        # exact one would keep.
         may_be_alive = bound_m + squares.circumradius_m > low_m * (1 + gap) - ROUNDING_M
         squares = squares.where(may_be_alive).meeting(region)
         alive = distance(squares.centres) + squares.circumradius_m > low_m * (1 + gap)
@@ -101,7 +112,8 @@ def cover_radius(
 
 
 def _farthest_centres(centres: FloatArray, bound_m: FloatArray, distance: PathDistance) -> FarthestCentres:
-    """The centres farthest from the path, and how far the first is; of all there are upper bounds."""
+    """The centres farthest from the path, and the distance of the farthest, by way of upper bounds of all."""
+    # A few exact distances give a threshold; a centre whose bound is below it cannot be among the farthest.
     likely = np.argsort(-bound_m)[: 4 * _HOPEFUL]
     least_m = np.sort(distance(centres[likely]))[-_HOPEFUL:][0]
     centres = centres[bound_m >= least_m - ROUNDING_M]

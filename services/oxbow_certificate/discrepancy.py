@@ -21,7 +21,7 @@ _GOLDEN_RATIO = (1 + math.sqrt(5)) / 2
 
 
 class _Edges(NamedTuple):
-    """Edges by their west and their east end (n, 2); `sign` is 1 above the region's inside, -1 below it."""
+    """Edges by their west and east ends, shape (n, 2); `sign` is 1 above the region's inside, -1 below it."""
 
     west: FloatArray
     east: FloatArray
@@ -30,7 +30,7 @@ class _Edges(NamedTuple):
 
 @dataclass(frozen=True)
 class Discrepancy:
-    """Centred L2 discrepancy, and the same as a share of what as many random positions are expected to have."""
+    """Centred L2 discrepancy, and its ratio to that expected of as many random positions."""
 
     value: float
     ratio: float
@@ -39,20 +39,26 @@ class Discrepancy:
 def discrepancy(region: MultiPolygon, paths: Paths, spacing_m: float, tolerance_m: float) -> Discrepancy | None:
     """Discrepancy of the positions of paths in a region (Rendas and Li 2016, section 1.2.1, entropy/discrepancy).
 
-    There is a position on each `spacing_m` of a path, or on longer pieces where there would be more than 4 000.
-    They are brought to the unit square by `unit_square`, along the long side of the region's least rectangle, and
-    their centred discrepancy (Hickernell 1998) is taken there. It is the same for mirrored and swapped axes, so
-    that it does not change where region and path are turned together.
+    There is one position on each `spacing_m` of a path, or on longer pieces if there would be more than 4 000.
+    They are mapped to the unit square by `unit_square`, in axes along the long side of the region's least
+    rectangle, and their centred discrepancy (Hickernell 1998) is taken there. That is the same for mirrored and
+    swapped axes, so it does not change when region and path are turned together.
 
     Parameters
     ----------
     region
-        Where positions should be uniform; those farther from it than `tolerance_m` are left out.
+        Where positions should be uniform.
+    paths
+        What is sampled.
+    spacing_m
+        The length of path per position.
+    tolerance_m
+        Positions farther from the region than this are left out; nearer ones count as on its border.
 
     Returns
     -------
     Discrepancy or None
-        None where no position is in the region.
+        None if no position is in the region.
     """
     piece_m = max(spacing_m, paths.length / _MOST_POSITIONS)
     positions = np.concatenate([_positions(path, piece_m) for path in shapely.get_parts(paths)])
@@ -70,10 +76,10 @@ def discrepancy(region: MultiPolygon, paths: Paths, spacing_m: float, tolerance_
 
 
 def unit_square(region: MultiPolygon, places: FloatArray) -> FloatArray:
-    """Map places of a region to the unit square, so that equal areas become equal areas (Rosenblatt 1952).
+    """Map places of a region to the unit square so that equal areas become equal areas (Rosenblatt 1952).
 
-    The first coordinate is the share of the region's area west of a place; the second is the share of the upright
-    line through it, as far as that runs in the region, south of the place. What is uniform on the region becomes
+    The first coordinate is the fraction of the region's area west of a place. The second is the fraction south of
+    it of the upright line through it, as far as that runs in the region. What is uniform on the region becomes
     uniform on the square, whatever the region's shape, and on an upright rectangle the map is a scaling. Places
     beside the region count as on its border.
 
@@ -81,18 +87,22 @@ def unit_square(region: MultiPolygon, places: FloatArray) -> FloatArray:
     ----------
     region
         Of positive area.
-    places : (n, 2)
+    places
+        Shape (n, 2), in metres.
 
     Returns
     -------
-    (m, 2)
-        In the order of their first coordinate; without those at a gap between parts, m < n.
+    ndarray, shape (m, 2)
+        In the order of their first coordinate; without places at a gap between parts, so that m may be less than
+        n.
     """
     west, east, sign = _edges(region)
+    # Edges are met from their west end to just before their east end, so that no place at a vertex meets two. The
+    # easternmost places are moved in accordingly.
     inner = np.clip(places[:, 0], west[:, 0].min(), np.nextafter(east[:, 0].max(), -np.inf))
     order = np.argsort(inner, kind="stable")
     x, y = inner[order], places[order, 1]
-    # Each edge meets the upright lines of places first[e] <= place < last[e].
+    # Edge e meets the upright lines of places first[e] <= place < last[e].
     first, last = np.searchsorted(x, west[:, 0]), np.searchsorted(x, east[:, 0])
     edge = np.repeat(np.arange(len(first)), last - first)
     place = np.arange(len(edge)) - np.repeat(np.cumsum(last - first) - last, last - first)
@@ -114,7 +124,7 @@ def unit_square(region: MultiPolygon, places: FloatArray) -> FloatArray:
 
 
 def _edges(region: MultiPolygon) -> _Edges:
-    """The edges of `region` that are not upright."""
+    """The edges of `region` that are not upright; upright ones have no part in areas or chords."""
     rings = shapely.get_rings(shapely.get_parts(shapely.orient_polygons(region)))
     xy, ring = shapely.get_coordinates(rings, return_index=True)
     start, end = xy[:-1], xy[1:]
@@ -128,7 +138,7 @@ def _edges(region: MultiPolygon) -> _Edges:
 
 
 def _positions(path: LineString, piece_m: float) -> FloatArray:
-    """A position on each of equal pieces of `path`, at offsets that fall into step with no legs."""
+    """One position on each of equal pieces of `path`, at offsets that do not fall into step with legs; (n, 2)."""
     count = math.ceil(path.length / piece_m)
     xy = shapely.get_coordinates(path)
     at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])

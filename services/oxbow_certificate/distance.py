@@ -17,15 +17,15 @@ __all__ = ["DistanceBounds", "PathDistance", "segments_of"]
 
 
 def segments_of(paths: Paths) -> npt.NDArray[Any]:
-    """The segments of paths as lines, in order, without those of no length."""
+    """The segments of paths as lines, in order, without those of length 0; shape (n,)."""
     return np.asarray(shapely.linestrings(segment_ends(paths)))
 
 
 _PIECES = 2_000
-"""A path is cut into some so many pieces at least: the box of a long oblique segment is mostly empty."""
+"""A path is cut into at least about this many pieces: the box of a long oblique segment is mostly empty."""
 
 _MOST_PLACES = 200_000
-"""Upper bounds are taken by about so many places of a path at most."""
+"""Upper bounds use at most about this many places of a path."""
 
 
 class PathDistance:
@@ -47,12 +47,12 @@ class PathDistance:
         return np.asarray(distances)
 
     def bounds(self, detail_m: float) -> DistanceBounds:
-        """Upper bounds of the distance, by places of the paths about so many metres apart."""
+        """Upper bounds of the distance, by places of the paths at most about `detail_m` apart."""
         return DistanceBounds(self._paths.segmentize(max(detail_m, self._paths.length / _MOST_PLACES)))
 
 
 class DistanceBounds:
-    """Upper bounds of the distance from places to paths: those to the nearest vertex, which is soon found."""
+    """Upper bounds of the distance from places to paths: that to the nearest vertex, which is quick to find."""
 
     def __init__(self, paths: Paths) -> None:
         self._tree = cKDTree(shapely.get_coordinates(paths))

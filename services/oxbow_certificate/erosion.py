@@ -9,17 +9,32 @@ from shapely.geometry.base import BaseGeometry
 __all__ = ["eroded", "polygons"]
 
 QUAD_SEGS = 16
-"""Segments for a quarter circle of an eroded contour: its chords come 0.12 % of the distance nearer."""
+"""Segments per quarter circle of an eroded contour: their chords come nearer by 0.12 % of the distance."""
 
 _STEP_QUAD_SEGS = 4
+"""The same in the steps before the last: the next step smooths their result."""
 
 
 def eroded(water: Polygon | MultiPolygon, depth_m: float, tolerance_m: float) -> BaseGeometry:
     """The places of `water` that are `depth_m` or more from its shore, to within about `tolerance_m`.
 
-    Erosions by discs compose (Serra 1982): where the shore has edges much shorter than `depth_m`, whose offset
-    arcs would all meet one another, it is eroded in steps that double, each of which smooths away detail before
-    the next. Shores of longer edges are eroded at once.
+    Erosions by discs compose (Serra 1982). If the shore has edges much shorter than `depth_m`, whose offset arcs
+    would all intersect, it is eroded in steps that double, each of which smooths away detail before the next.
+    Shores of longer edges are eroded at once.
+
+    Parameters
+    ----------
+    water
+        What is eroded.
+    depth_m
+        The least distance from the shore, >= 0.
+    tolerance_m
+        How far the result may lie from the exact one, > 0.
+
+    Returns
+    -------
+    geometry
+        Polygonal, in any number of parts; maybe empty.
     """
     shore = water.simplify(tolerance_m)
     if depth_m == 0:

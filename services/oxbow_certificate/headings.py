@@ -13,16 +13,16 @@ from oxbow_certificate.axes import Paths, segment_ends
 __all__ = ["count_turns", "directional_evenness"]
 
 TURN_RAD = math.radians(45.0)
-"""The least change of heading that is a turn."""
+"""The least change of heading that counts as a turn."""
 
 
 def directional_evenness(paths: Paths) -> float:
-    """How evenly paths sample all directions: 0 for one direction, 1 for all alike.
+    """How evenly paths sample all directions: 0 for a single direction, 1 for all alike.
 
-    Directions are headings without their sense, on a half circle, weighted by length. They are compared with
-    the uniform distribution by Watson's U^2 (Watson 1961), which does not depend on where the circle is cut: the
-    variance of the difference of the two distribution functions. It is 1/12 for one direction, and the figure is
-    1 - sqrt(12 U^2): for k directions sampled alike, evenly apart, 1 - 1/k.
+    Directions are headings regardless of their sense, on a half circle, weighted by length. They are compared with
+    the uniform distribution by Watson's U^2 (Watson 1961): the variance of the difference of the two distribution
+    functions, which does not depend on where the circle is cut. It is 1/12 for one direction, and the measure is
+    1 - sqrt(12 U^2): 1 - 1/k for k directions sampled alike, at equal angles.
     """
     steps = _steps(paths)
     length = np.hypot(*steps.T)
@@ -38,10 +38,17 @@ def directional_evenness(paths: Paths) -> float:
 
 
 def count_turns(path: LineString, reach_m: float) -> int:
-    """Number of turns of a path: changes of heading by 45 degrees or more within `reach_m` metres of way.
+    """The number of turns of a path: changes of heading by 45 degrees or more within `reach_m` along it.
 
-    The change is gathered, so that a round turn of many short segments is one turn, and a gentle curve is none,
-    however many vertices it has. Turning places to the same side, no more than `reach_m` apart, are one turn.
+    Changes add up, so that a round turn of many short segments is one turn, and a gentle curve is none, however
+    many vertices it has. Turns to the same side that are no more than `reach_m` apart count as one.
+
+    Parameters
+    ----------
+    path
+        The path.
+    reach_m
+        The length of path within which changes add up.
     """
     steps = _steps(path)
     heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
@@ -50,7 +57,7 @@ def count_turns(path: LineString, reach_m: float) -> int:
 
 
 def _count_left_turns(heading: FloatArray, corner_at: FloatArray, reach_m: float) -> int:
-    """Turns by which `heading` (n,) grows; `corner_at` (n - 1,) is how far along the path it changes."""
+    """How many turns `heading` (n,) makes by growing; `corner_at` (n - 1,) is where along the path it changes."""
     corners = np.arange(len(corner_at))
     gathered = heading[1:] - _range_minimum(heading, np.searchsorted(corner_at, corner_at - reach_m), corners)
     turning = corners[(gathered >= TURN_RAD) & (np.diff(heading) > 0)]
@@ -69,5 +76,5 @@ def _range_minimum(values: FloatArray, first: Indices, last: Indices) -> FloatAr
 
 
 def _steps(paths: Paths) -> FloatArray:
-    """The ways (n, 2) from each waypoint to the next, without those of no length."""
+    """The vectors from each waypoint to the next, without those of length 0; shape (n, 2)."""
     return np.diff(segment_ends(paths), axis=1)[:, 0]

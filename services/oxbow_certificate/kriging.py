@@ -1,9 +1,9 @@
-"""How well a field can be told from its samples along a path: the kriging variance.
+"""How well a field can be reconstructed from samples along a path: the kriging variance.
 
 Rendas and Li 2016, section 1.2, second approach: where a stochastic model of the field is known, the discrepancy
 between the true and the reconstructed field is replaced by its expected value. With a variogram and an unknown
 mean, the best linear reconstruction is ordinary kriging (Matheron 1963; Cressie 1993, section 3.2). Its expected
-squared error at a place depends on where the field is sampled, not on the values found: it is known beforehand.
+squared error at a place depends on where the field is sampled, not on the values: it is known in advance.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from oxbow_certificate.axes import Paths
 __all__ = ["KrigingVariance", "correlation", "kriging_variance", "local_variance", "sampled", "sampling_pitch"]
 
 PITCH = 0.1
-"""Samples of the path are at most so far apart, as a share of the variogram's range."""
+"""The greatest distance of samples along a path, as a fraction of the variogram's range."""
 MOST_SAMPLES = 200_000
 NEAREST, SPREAD = 20, 12
-"""Samples that the field at a place is told from: see `local_variance`."""
+"""Samples from which the field at a place is reconstructed: see `local_variance`."""
 LEAST_NUGGET = 1e-9
-"""As a share of the sill: keeps the equations regular where a smooth field is sampled densely."""
+"""A fraction of the sill: it keeps the equations regular where a smooth field is sampled densely."""
 _CHUNK = 1_000
 
 _TWENTYFOLD = math.log(20.0)
@@ -42,12 +42,12 @@ _CORRELATIONS: dict[VariogramModel, Callable[[FloatArray], FloatArray]] = {
     VariogramModel.GAUSSIAN: lambda h: np.exp(-_TWENTYFOLD * h**2),
     VariogramModel.MATERN32: lambda h: (1.0 + _MATERN32 * h) * np.exp(-_MATERN32 * h),
 }
-"""By distance / range: 0.05 at 1, but for the spherical model."""
+"""Correlation by distance / range: 0.05 at 1, or 0 in the spherical model."""
 
 
 @dataclass(frozen=True)
 class KrigingVariance:
-    """Mean and maximum over a region of the kriging variance, as shares of the sill."""
+    """Mean and maximum over a region of the kriging variance, as fractions of the sill."""
 
     mean: float
     max: float
@@ -65,9 +65,9 @@ def kriging_variance(
     places : ndarray of shape (n, 2)
         Where it is reconstructed: places spread evenly over a region.
     variogram
-        How it varies.
+        How the field varies.
     least_radius_m
-        The least cover radius that paths of this length could have over the region.
+        The least cover radius that paths of this length could have over the region; see `least_radius`.
     """
     pitch_m = sampling_pitch(variogram, paths, least_radius_m)
     samples = np.concatenate([sampled(path, pitch_m) for path in shapely.get_parts(paths)])
@@ -76,15 +76,32 @@ def kriging_variance(
 
 
 def sampling_pitch(variogram: Variogram, paths: Paths, least_radius_m: float) -> float:
-    """How far apart to sample paths, in metres: finely against the range, and as finely along legs as across.
+    """How far apart to sample paths, in metres: finely for the range, and no more coarsely along legs than across.
 
-    Vehicles sample more often; their further samples would change little, and only for the better.
+    Vehicles sample more often. Their additional samples would change little, and only for the better.
+
+    Parameters
+    ----------
+    variogram
+        How the field varies.
+    paths
+        Where it is sampled, at no more than about `MOST_SAMPLES` positions.
+    least_radius_m
+        The least cover radius of paths of this length: half the spacing of ideal legs.
     """
     return max(min(PITCH * variogram.range_m, least_radius_m), paths.length / MOST_SAMPLES)
 
 
 def sampled(path: LineString, pitch_m: float) -> FloatArray:
-    """Positions (n, 2) along a path, both ends among them, at equal distances of at most `pitch_m`."""
+    """Positions at equal distances along a path, both ends among them, shape (n, 2).
+
+    Parameters
+    ----------
+    path
+        The path; of positive length.
+    pitch_m
+        The greatest distance between positions.
+    """
     xy = shapely.get_coordinates(path)
     at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
     samples = np.linspace(0.0, at[-1], math.ceil(at[-1] / pitch_m) + 1)
@@ -92,16 +109,31 @@ def sampled(path: LineString, pitch_m: float) -> FloatArray:
 
 
 def correlation(variogram: Variogram, distance_m: FloatArray) -> FloatArray:
-    """Covariance of the field at two places apart, as a share of the sill; the nugget is lost at any distance."""
+    """Covariance of the field at two places, as a fraction of the sill.
+
+    The nugget is lost between any two samples, even of one place.
+
+    Parameters
+    ----------
+    variogram
+        How the field varies.
+    distance_m
+        Between the two places, of any shape.
+
+    Returns
+    -------
+    ndarray
+        Of the shape of `distance_m`.
+    """
     nugget = max(variogram.nugget / variogram.sill, LEAST_NUGGET)
     return (1.0 - nugget) * _CORRELATIONS[variogram.model](distance_m / variogram.range_m)
 
 
 def local_variance(samples: FloatArray, places: FloatArray, variogram: Variogram) -> FloatArray:
-    """Ordinary kriging variance at places, from a few samples for each; as a share of the sill, shape (n,).
+    """Ordinary kriging variance at places, each from a few samples; as a fraction of the sill, shape (n,).
 
-    Those are the nearest samples, which screen off the ones behind them, and some spread over all, which tell the
-    field's mean. Further samples could only lower the variance: it is never underrated.
+    These are the nearest samples, which screen off those behind them, and some spread over all, which determine
+    the field's mean. Additional samples could only lower the variance, so it is never underestimated.
 
     Parameters
     ----------
@@ -109,6 +141,8 @@ def local_variance(samples: FloatArray, places: FloatArray, variogram: Variogram
         Where the field is sampled.
     places : ndarray of shape (n, 2)
         Where it is reconstructed.
+    variogram
+        How it varies.
     """
     tree = KDTree(samples)
     nearest = np.arange(1, min(NEAREST, len(samples)) + 1)
@@ -118,6 +152,7 @@ def local_variance(samples: FloatArray, places: FloatArray, variogram: Variogram
         near_m, near = map(np.asarray, tree.query(chunk, k=nearest))
         used = samples[np.concatenate([near, np.broadcast_to(spread, (len(chunk), SPREAD))], axis=1)]
         distance_m = np.linalg.norm(used - chunk[:, None], axis=2)
+        # A spread sample as near as the nearest ones may be one of them; two equal rows would make C singular.
         counts = distance_m > near_m[:, -1:]
         counts[:, : len(nearest)] = True
         variances.append(_variance(used, distance_m, counts, variogram))
@@ -133,11 +168,13 @@ def _variance(samples: FloatArray, distance_m: FloatArray, counts: Mask, variogr
     Parameters
     ----------
     samples : ndarray of shape (n, k, 2)
-        Where they are.
+        Their positions.
     distance_m : ndarray of shape (n, k)
-        Of each to its place.
+        From each to its place.
     counts : ndarray of shape (n, k)
-        False where a sample may be given twice, and gets no weight.
+        False for a sample that may be a duplicate; it gets no weight.
+    variogram
+        How the field varies.
     """
     x, y = samples[:, :, 0], samples[:, :, 1]
     apart_m = np.hypot(x[:, :, None] - x[:, None], y[:, :, None] - y[:, None])
@@ -147,6 +184,7 @@ def _variance(samples: FloatArray, distance_m: FloatArray, counts: Mask, variogr
     towards = correlation(variogram, distance_m) * counts
     simple, unit = np.moveaxis(np.linalg.solve(among, np.stack([towards, counts], axis=2)), 2, 0)
     weights = simple + unit * ((1.0 - simple.sum(axis=1)) / unit.sum(axis=1))[:, None]
-    # Of the weights found, not by the shorter formula of the best ones: rounding cannot make it negative.
+    # This is the variance of the weights found. The shorter formula, which holds for the best weights alone, could
+    # come out negative by rounding.
     between = np.einsum("ni,nij,nj->n", weights, among, weights)
     return np.asarray(1.0 - 2.0 * (weights * towards).sum(axis=1) + between)

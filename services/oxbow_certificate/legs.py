@@ -1,4 +1,4 @@
-"""The MaxMin criterion of a path: how near its parallel legs come to one another."""
+"""The MaxMin criterion of a path: the least distance between its parallel legs."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ PARALLEL_RAD = math.radians(30.0)
 """Stretches whose directions differ by no more than this are parallel."""
 
 NEIGHBOURS = 2.0
-"""Places nearer to each other along the path than so many spacings are neighbours on one leg or its turn."""
+"""Places within this many spacings of each other along the path are neighbours on one leg or its turn."""
 
 REACH = 4.0
-"""Legs are looked for within so many spacings."""
+"""Legs are searched for within this many spacings."""
 
 _MOST_PIECES = 5_000
 _CHUNK = 1024
@@ -33,31 +33,31 @@ _CHUNK = 1024
 def least_leg_distance(path: LineString, spacing_m: float, excused: BaseGeometry) -> float | None:
     """Least distance between parallel legs of a path, in metres (Rendas and Li 2016, section 1.2.1, MaxMin).
 
-    The report takes the least distance between sampled points, which along a path is the sampling step. Here the
-    points are places on two legs: stretches that are parallel to within 30 degrees, face each other (the shortest
-    way between them is perpendicular to one of them), and are no neighbours along the path. Two straight stretches
-    are nearest at an end of one of them, so that no leg is missed between samples.
+    The report takes the least distance between sampled points, which along a path is just the sampling step. This
+    takes places on two legs instead: stretches that are parallel to within 30 degrees, face each other (the
+    shortest way between them is perpendicular to one of them), and are not neighbours along the path. Two straight
+    stretches are nearest at an end of one of them, so that no leg is missed between samples.
 
     Parameters
     ----------
     path
-        The path; where it is closed, its end is a neighbour of its start.
+        The path; if it is closed, its end is a neighbour of its start.
     spacing_m
-        Nominal spacing of legs, the scale of what is a neighbour.
+        Nominal spacing of legs: the scale by which places are neighbours.
     excused
-        Where legs may meet: about the launch and recovery points.
+        Where legs may meet: about the launch and recovery points; see `about_ends`.
 
     Returns
     -------
     float or None
-        None where no two legs face each other within four spacings.
+        None if no two legs face each other within four spacings.
     """
     along = main_direction(path)
     excused = shapely.transform(excused, lambda xy: turned(xy, along))
     path = LineString(turned(shapely.get_coordinates(path), along))
     pieces = _Pieces.of(path, max(spacing_m, path.length / _MOST_PIECES))
     asked = np.flatnonzero(~shapely.intersects_xy(excused, pieces.ends))
-    # Most paths have legs within a spacing: a wider search would find the same.
+    # Most paths have legs within one spacing, and a wider search, which takes longer, would find the same.
     for reach in (1.0, REACH):
         least_m = pieces.least_distance(asked, reach * spacing_m, NEIGHBOURS * spacing_m)
         if least_m < math.inf:
@@ -66,8 +66,18 @@ def least_leg_distance(path: LineString, spacing_m: float, excused: BaseGeometry
 
 
 def about_ends(free: BaseGeometry, ends: Sequence[Place], margin_m: float) -> BaseGeometry:
-    """Where legs may meet: about `ends`, the launch and recovery points, within one and a half times the distance
-    to the free space and a margin.
+    """Where legs may meet: about the launch and recovery points.
+
+    Discs reach one and a half times as far as the free space, and a margin farther: all the way there is excused.
+
+    Parameters
+    ----------
+    free
+        The free space.
+    ends
+        The launch and recovery points, maybe outside the free space.
+    margin_m
+        Added to the radius of each disc.
     """
     points = shapely.points(ends)
     radius_m = margin_m + 1.5 * shapely.distance(points, free)
@@ -78,7 +88,8 @@ def about_ends(free: BaseGeometry, ends: Sequence[Place], margin_m: float) -> Ba
 class _Pieces:
     """A path cut into n straight pieces, and their 2n ends: all the starts, then all the ends.
 
-    `along` (n, 2) are unit vectors, `at_m` (2n,) how far along the path each of the ends lies.
+    `along` (n, 2) are unit vectors, `at_m` (2n,) the positions of the ends along the path, and `ring_m` is the
+    length of a closed path, infinite for an open one.
     """
 
     tree: STRtree
@@ -104,10 +115,10 @@ class _Pieces:
         )
 
     def least_distance(self, asked: Indices, within_m: float, neighbours_m: float) -> float:
-        """Least distance from the ends `asked` to a piece of another leg that one faces; infinite without any."""
+        """Least distance from the ends `asked` to a piece of another leg that they face; infinite if none."""
         points = np.asarray(shapely.points(self.ends[asked]))
         least_m = math.inf
-        # In parts, since a path that is one tangle has pairs by the square of its length.
+        # In chunks, since the pairs of a tangled path grow as the square of its length, and with them the memory.
         for first in range(0, len(asked), _CHUNK):
             part = slice(first, first + _CHUNK)
             found, piece = self.tree.query(points[part], predicate="dwithin", distance=within_m)
@@ -116,7 +127,7 @@ class _Pieces:
         return least_m
 
     def _facing_distances(self, end: Indices, piece: Indices, neighbours_m: float) -> FloatArray:
-        """Distances of the pairs of an end and a piece that are parallel, face each other, are no neighbours."""
+        """Distances of pairs of an end and a piece that are parallel, face each other and are not neighbours."""
         along = self.along[piece]
         way = self.ends[end] - self.ends[piece]
         ahead_m = np.vecdot(way, along)

@@ -25,7 +25,7 @@ class Squares:
 
     @classmethod
     def around(cls, region: BaseGeometry) -> Squares:
-        """The one square about the bounds of `region`."""
+        """The single square about the bounds of `region`."""
         west, south, east, north = region.bounds
         return cls(np.array([[(west + east) / 2, (south + north) / 2]]), max(east - west, north - south) / 2)
 
@@ -34,7 +34,7 @@ class Squares:
 
     @property
     def circumradius_m(self) -> float:
-        """From a square's centre to its corners."""
+        """The distance from a square's centre to its corners."""
         return self.half_m * math.sqrt(2.0)
 
     def where(self, keep: Mask) -> Squares:
@@ -42,7 +42,7 @@ class Squares:
         return Squares(self.centres[keep], self.half_m)
 
     def meeting(self, region: BaseGeometry) -> Squares:
-        """The squares that have a point of `region`."""
+        """The squares that intersect `region`."""
         low, high = self.centres - self.half_m, self.centres + self.half_m
         return self.where(shapely.intersects(region, shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])))
 

@@ -1,4 +1,4 @@
-"""The water that paths are judged on: the mission's own, not the planner's simplified one."""
+"""The water on which paths are judged: the mission's own, not the planner's simplified one."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from oxbow_certificate.erosion import eroded, polygons
 __all__ = ["JudgedSpace"]
 
 DETAIL_SHARE = 1e-3
-"""How far the judged shore may lie from the true one, as a share of what is measured: see `_detail`."""
+"""How far the judged shore may lie from the true one, as a fraction of what is measured: see `_detail`."""
 
 
 @dataclass(frozen=True)
 class JudgedSpace:
-    """Water, free space, and the part of the free space that the distances are taken over.
+    """Water, free space, and the part of the free space over which distances are taken.
 
     Attributes
     ----------
     water
         The outline less the forbidden zones.
     free
-        The water, but for narrows, eroded by the safety distance: its connected parts.
+        The water without narrows, eroded by the safety distance: its connected parts.
     asked
         What is to be covered: all of `free`, or those of the request's areas that lie in it.
     judged
-        The parts of `asked` that a path enters; all of them where none is entered.
+        The parts of `asked` that a path enters; all of them if none is entered.
     judged_area
-        The share of the asked area that is entered, 0 to 1.
+        The fraction of the area of `asked` that is entered, 0 to 1.
     detail_m
         Detail of the shore finer than this is not followed in `free`.
     """
@@ -59,7 +59,7 @@ class JudgedSpace:
         if water.is_empty:
             raise Infeasible("cover the whole outline; expected some water between them", where="zones")
         detail_m = _detail(water, request)
-        # The safety distance leaves out what is narrower than twice itself.
+        # Erosion by the safety distance removes what is narrower than twice that distance anyway.
         width_m = request.least_width_m if 2 * request.safety_m < request.least_width_m else 0.0
         parts = polygons(eroded(without_narrows(water, width_m), request.safety_m, detail_m))
         if not parts:
@@ -89,7 +89,7 @@ def _asked(free: MultiPolygon, request: CertifyRequest) -> MultiPolygon:
 
 
 def _detail(water: MultiPolygon, request: CertifyRequest) -> float:
-    """Tolerance that moves area, distances and erosion by at most a thousandth: a million vertices need one."""
+    """A tolerance that changes area, distances and erosion by at most 0.1 %: a million vertices need one."""
     length_m = sum(track.path.length for track in request.tracks)
     scales = [water.area / water.length, least_radius(water.area, length_m)]
     if request.safety_m:
@@ -98,5 +98,5 @@ def _detail(water: MultiPolygon, request: CertifyRequest) -> float:
 
 
 def _inradius(water: MultiPolygon) -> float:
-    """Radius of the largest disc that fits in the water, in metres."""
+    """The radius of the largest disc that fits in the water, in metres."""
     return max(float(shapely.maximum_inscribed_circle(part).length) for part in water.geoms)

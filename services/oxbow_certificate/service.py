@@ -14,7 +14,7 @@ STAGE = "certificate"
 RED = (214, 47, 39)
 
 GAP_RATIO = 1.1
-"""Places farther from the path than so many least radii are shown as gaps; ideal transects have none above 1."""
+"""Places farther from the path than this many least radii are shown as gaps; ideal transects have none above 1."""
 
 RULES = ("length_m", "outside_m", "unsafe_m", "judged_area", "crossings", "turns")
 COVERAGE = ("q", "mean_ratio", "p95_ratio", "p99_ratio")
@@ -22,7 +22,14 @@ EVENNESS = ("least_leg_distance_m", "discrepancy_ratio", "directional_evenness")
 
 
 def handle(request: CertifyRequest, show: Show) -> Certificate:
-    """Certify a request's paths, and show them, their gaps, the worst of them and the figures.
+    """Certify a request's paths, and show them, their gaps, the worst gap and the figures.
+
+    Parameters
+    ----------
+    request
+        The paths, and the mission that they are judged by.
+    show
+        Takes the layers of the recording.
 
     Raises
     ------
@@ -40,7 +47,7 @@ def handle(request: CertifyRequest, show: Show) -> Certificate:
 
 
 def _gaps(judgement: Judgement) -> Layer:
-    """Sampled places that lie far from every path, coloured by how far between what is far and the largest."""
+    """Sampled places far from every path, coloured by distance from the threshold (0) to the largest (1)."""
     spread = judgement.spread
     far_m = GAP_RATIO * judgement.certificate.least_radius_m
     far = spread.distance_m > far_m

@@ -1,4 +1,4 @@
-"""How distance to the path is spread over a region: evenness, beyond the one worst place."""
+"""How distance to the path is distributed over a region, beyond its single worst place."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _GOLDEN_RATIO = (1 + math.sqrt(5)) / 2
 
 @dataclass(frozen=True)
 class DistanceSpread:
-    """Places spread evenly over a region (n, 2), and the distance of each to a path (n,), in metres."""
+    """Places spread evenly over a region, shape (n, 2), and their distances to a path, in metres, shape (n,)."""
 
     places: FloatArray
     distance_m: FloatArray
@@ -31,26 +31,43 @@ class DistanceSpread:
 
     @property
     def p95_m(self) -> float:
-        """The distance that 95 % of the area is within."""
+        """The distance within which 95 % of the area lies."""
         return float(np.quantile(self.distance_m, 0.95))
 
     @property
     def p99_m(self) -> float:
-        """The distance that 99 % of the area is within."""
+        """The distance within which 99 % of the area lies."""
         return float(np.quantile(self.distance_m, 0.99))
 
 
 def distance_spread(region: MultiPolygon, distance: PathDistance, *, count: int = 32_000) -> DistanceSpread:
-    """Distance to a path at `count` places of `region`."""
+    """Distance to a path at places spread evenly over a region.
+
+    Parameters
+    ----------
+    region
+        Of positive area.
+    distance
+        Distance to the path.
+    count
+        The number of places.
+    """
     places = even_places(region, count)
     return DistanceSpread(places, distance(places))
 
 
 def even_places(region: MultiPolygon, count: int) -> FloatArray:
-    """Places (count, 2) spread over `region` evenly by area: the same for the same arguments.
+    """Places spread over `region` evenly by area, shape (count, 2); the same for the same arguments.
 
-    A Fibonacci lattice of the unit square: each of `count` equal shares of the area takes one place, and no grid
-    falls into step with parallel transects.
+    They are a Fibonacci lattice of the unit square, mapped to the region: each of `count` equal parts of the area
+    gets one place, and there is no grid to fall into step with parallel transects.
+
+    Parameters
+    ----------
+    region
+        Of positive area.
+    count
+        The number of places.
     """
     number = np.arange(count)
     return spread(np.column_stack([(number + 0.5) / count, number / _GOLDEN_RATIO % 1.0]), region)
