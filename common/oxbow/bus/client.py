@@ -64,8 +64,17 @@ class Bus(Session):
     def wait_ready(self, stages: Iterable[str], timeout_s: float) -> None:
         """Return once each of `stages` has a live replica.
 
+        Parameters
+        ----------
+        stages
+            Names of stages, or of services, such as ``mission``.
+        timeout_s
+            Seconds to wait at most.
+
         Raises
         ------
+        InvalidMission
+            `timeout_s` is no wait (`oxbow.wire.waits`).
         Unavailable
             Some have none after `timeout_s`; the message names them.
         """
@@ -76,7 +85,21 @@ class Bus(Session):
     def call(self, endpoint: Endpoint[Q, R], request: Q, envelope: Envelope) -> R:
         """Ask a stage.
 
-        A replica that is busy, or lost while it works, is replaced by another, or by itself a little later.
+        If a replica is busy, or is lost while it works, another one is asked, or the same one a little later.
+
+        Parameters
+        ----------
+        endpoint
+            The stage, and the types of its messages.
+        request
+            What to ask.
+        envelope
+            The request's id and deadline, and the mission and run that it belongs to.
+
+        Returns
+        -------
+        Message
+            The stage's reply, of the endpoint's type.
 
         Raises
         ------
@@ -87,7 +110,7 @@ class Bus(Session):
         DeadlineExceeded
             No answer before the envelope's deadline.
         Internal
-            `MOST_FAILURES` times, the request cost a worker process, or got what is no answer to it.
+            The request cost a worker process, or got a wrong answer, `MOST_FAILURES` times.
         OxbowError
             Whatever the stage itself raised.
         """
@@ -96,7 +119,22 @@ class Bus(Session):
         )
 
     def forward(self, endpoint: Endpoint[Any, Any], payload: bytes, envelope: Envelope) -> bytes:
-        """Ask a stage by a request that is encoded already, and return its reply unread; see `call`."""
+        """Ask a stage without reading messages; see `call`, which raises the same.
+
+        Parameters
+        ----------
+        endpoint
+            The stage.
+        payload
+            The encoded request.
+        envelope
+            The request's id and deadline, and the mission and run that it belongs to.
+
+        Returns
+        -------
+        bytes
+            The encoded reply, which may turn out to be unreadable.
+        """
         return self._asked(endpoint, payload, envelope, lambda reply: reply)
 
     def _asked(
@@ -147,7 +185,7 @@ class _Lost(Unavailable):
 
 
 class _Failed(Unavailable):
-    """The replica is there, but has not answered: its worker process died with the request, or it said else."""
+    """The replica is alive, but has not answered: its worker process died, or the answer was a wrong one."""
 
     def __init__(self, message: str, outcome: str) -> None:
         super().__init__(message)
@@ -155,7 +193,7 @@ class _Failed(Unavailable):
 
 
 class _Attempts(Generic[A]):
-    """The attempts at one request, and what became of them; `read` makes an answer of a reply's bytes."""
+    """The attempts at one request, and what became of them; `read` decodes the bytes of a reply."""
 
     def __init__(
         self,
@@ -207,6 +245,7 @@ class _Attempts(Generic[A]):
     def _ask(self, instance: str) -> A:
         key = self.endpoint.instance_key(instance)
         timeout_s = max(0.0, self.envelope.remaining_s()) + REPLY_GRACE_S
+        # The key is that of one replica: the first reply is the only one.
         for reply in self.bus._get(key, self.payload, attachment=self.attachment, timeout_s=timeout_s):
             if reply.ok is not None:
                 return self._answer(reply.ok, key)
@@ -227,12 +266,14 @@ class _Attempts(Generic[A]):
 
     def _error(self, reply: zenoh.ReplyError, key: str, timeout_s: float) -> OxbowError:
         """The exception to raise for an error reply, if it is one to this request."""
+        # Zenoh's time-out carries no request id, so it is recognized before the id is checked.
         if is_timeout(reply):
             return error_of(reply, key, timeout_s)
         told = told_error(reply, key)
         if told.request_id != self.envelope.request_id:
             whose = f"an error to request {told.request_id[:MOST_ID_CHARACTERS]!r}"
             return _Failed(f"{key} replied {whose}, not to {self.envelope.request_id!r}: {told.message}", WRONG)
+        # A stage is unavailable when its worker process is: the request may have killed it, so that this counts.
         if told.code is ErrorCode.UNAVAILABLE:
             return _Failed(told.message, "worker lost")
         return told.error()

@@ -1,4 +1,4 @@
-"""Zenoh settings of a client and of the router: what each is for was measured, not guessed."""
+"""Zenoh settings of a client and of the router, each with the reason for it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 _ENDPOINT = re.compile(r"[a-z][a-z0-9_-]*/\S+")
 
 _COMMON: dict[str, Any] = {
-    # Processes meet at the router they are told of, and nowhere else.
+    # Processes meet at the router they are given, and nowhere else.
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
     # Shared memory loses queries of 3 KB and more in zenoh 1.10.
@@ -27,7 +27,20 @@ _COMMON: dict[str, Any] = {
 
 
 def client_config(endpoint: str, timeout_s: float) -> zenoh.Config:
-    """Of a process that joins the router at `endpoint`, and joins again when the router comes back."""
+    """Settings of a process that joins a router, and joins again when the router comes back.
+
+    Parameters
+    ----------
+    endpoint
+        Where the router listens.
+    timeout_s
+        Seconds to try for the first connection.
+
+    Raises
+    ------
+    InvalidMission
+        The endpoint is not of the form PROTOCOL/ADDRESS.
+    """
     require_endpoint(endpoint)
     return _config(
         {
@@ -40,13 +53,26 @@ def client_config(endpoint: str, timeout_s: float) -> zenoh.Config:
 
 
 def router_config(endpoint: str) -> zenoh.Config:
-    """Of the router that listens at `endpoint`."""
+    """Settings of the router that listens at `endpoint`."""
     require_endpoint(endpoint)
     return _config({"mode": "router", "listen/endpoints": [endpoint], "scouting/delay": 0})
 
 
 def require_endpoint(endpoint: str, where: str = "endpoint") -> None:
-    """Check that an endpoint has a protocol and an address."""
+    """Check that an endpoint has a protocol and an address.
+
+    Parameters
+    ----------
+    endpoint
+        What to check.
+    where
+        What an error calls it.
+
+    Raises
+    ------
+    InvalidMission
+        It has not.
+    """
     if not _ENDPOINT.fullmatch(endpoint):
         raise InvalidMission(f"is {endpoint!r}; expected PROTOCOL/ADDRESS, as {DEFAULT_ENDPOINT}", where=where)
 

@@ -59,10 +59,11 @@ class Mailbox(Generic[T]):
         if self._closed.is_set():
             return
         self._closed.set()
+        # Behind all that waits: a thread that takes the mark ends when that has been delivered.
         for _ in self._threads:
             self._items.put(None)
         for thread in self._threads:
-            if thread is not threading.current_thread():
+            if thread is not threading.current_thread():  # an item may close its own mailbox
                 thread.join()
 
     def _run(self) -> None:

@@ -47,11 +47,23 @@ class Query:
         return b"" if self._query.attachment is None else self._query.attachment.to_bytes()
 
     def reply(self, key: str, payload: bytes, *, encoding: str = JSON, attachment: bytes | None = None) -> None:
-        """Give one reply; `key` must match the one that is asked."""
+        """Give one of any number of replies.
+
+        Parameters
+        ----------
+        key
+            What the reply is about; it must match the key that is asked.
+        payload
+            The reply, encoded.
+        encoding
+            The MIME type of the payload.
+        attachment
+            What travels beside the payload, as the id of a request to a stage.
+        """
         self._query.reply(key, payload, encoding=encoding, attachment=attachment)
 
     def fail(self, error: ErrorReply) -> None:
-        """Reply an error; its JSON encoding tells it from zenoh's own."""
+        """Reply an error; its JSON encoding distinguishes it from zenoh's own."""
         self._query.reply_err(msgspec.json.encode(error), encoding=JSON)
 
     def __enter__(self) -> Self:

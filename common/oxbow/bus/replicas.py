@@ -29,7 +29,17 @@ class Replicas:
         self._missing_since: dict[str, float] = {}
 
     def update(self, stage: str, instance: str, alive: bool) -> None:
-        """Note that a replica has come or gone."""
+        """Note that a replica has come or gone.
+
+        Parameters
+        ----------
+        stage
+            The replica's stage.
+        instance
+            Its name.
+        alive
+            Whether its liveliness token is there.
+        """
         with self._changed:
             if alive:
                 self._alive[stage].add(instance)
@@ -51,13 +61,41 @@ class Replicas:
             return time.monotonic() - self._missing_since.get(stage, self._started)
 
     def wait_alive(self, stages: Collection[str], timeout_s: float) -> tuple[str, ...]:
-        """Wait until each of `stages` has a live replica; return those that have none after `timeout_s`."""
+        """Wait until stages have live replicas.
+
+        Parameters
+        ----------
+        stages
+            Their names.
+        timeout_s
+            Seconds to wait at most.
+
+        Returns
+        -------
+        tuple of str
+            The stages that still have none; empty where each has one.
+        """
         with self._changed:
             self._changed.wait_for(lambda: all(self._alive[stage] for stage in stages), timeout_s)
             return tuple(stage for stage in stages if not self._alive[stage])
 
     def acquire(self, stage: str, avoid: Collection[str], timeout_s: float) -> str | None:
-        """Choose a live replica, preferably none to `avoid`, and count a request on it; None after `timeout_s`."""
+        """Choose a live replica, and count a request on it until `release`.
+
+        Parameters
+        ----------
+        stage
+            The replica's stage.
+        avoid
+            Replicas to choose only where no other is alive.
+        timeout_s
+            Seconds to wait for one with room.
+
+        Returns
+        -------
+        str or None
+            The replica's name; None where none had room in time.
+        """
         give_up = time.monotonic() + timeout_s
         with self._changed:
             while (instance := self._best(stage, avoid)) is None:
@@ -68,13 +106,20 @@ class Replicas:
             return instance
 
     def release(self, stage: str, instance: str) -> None:
-        """The request on `instance` is over, one way or another."""
+        """Count a request off, answered or not.
+
+        Parameters
+        ----------
+        stage, instance
+            The replica that `acquire` chose.
+        """
         with self._changed:
             self._outstanding[stage, instance] -= 1
             self._changed.notify_all()
 
     def _best(self, stage: str, avoid: Collection[str]) -> str | None:
         alive = self._alive[stage]
+        # Where all live ones are to be avoided, one of them is better than none.
         candidates = [
             (self._outstanding[stage, instance], self._asked.get((stage, instance), -1), instance)
             for instance in (alive - set(avoid)) or alive

@@ -43,6 +43,13 @@ def start_router(listen: str = "tcp/127.0.0.1:0", *, timeout_s: float = 5.0) -> 
     ----------
     listen
         Port 0 stands for any free port.
+    timeout_s
+        Seconds until it must listen.
+
+    Returns
+    -------
+    RouterProcess
+        The process, and the endpoint with its actual port.
 
     Raises
     ------
@@ -52,7 +59,7 @@ def start_router(listen: str = "tcp/127.0.0.1:0", *, timeout_s: float = 5.0) -> 
     read_fd, write_fd = os.pipe()
     command = [sys.executable, "-m", __name__, "--listen", listen, "--ready-fd", str(write_fd)]
     process = subprocess.Popen([*command, "--parent", str(os.getpid())], pass_fds=[write_fd], stdout=2)
-    os.close(write_fd)
+    os.close(write_fd)  # else the end of the router would not be seen as the end of the pipe
     with os.fdopen(read_fd, "rb") as ready:
         arrived, _, _ = select.select([ready], [], [], timeout_s)
         endpoint = ready.readline().decode().strip() if arrived else ""
@@ -64,7 +71,22 @@ def start_router(listen: str = "tcp/127.0.0.1:0", *, timeout_s: float = 5.0) -> 
 
 
 def run_router(listen: str, lifetime: Lifetime, ready_fd: int | None = None) -> None:
-    """Route until `lifetime` is over; write the endpoint to `ready_fd` once it listens."""
+    """Route until a lifetime is over.
+
+    Parameters
+    ----------
+    listen
+        Where to listen; port 0 stands for any free port.
+    lifetime
+        When to end.
+    ready_fd
+        A file descriptor to write the endpoint to once the router listens, and to close.
+
+    Raises
+    ------
+    Unavailable
+        It cannot listen there.
+    """
     session, endpoint = _open(listen)
     with session:
         _log.info("router listens on %s", endpoint)

@@ -78,8 +78,17 @@ class Session(Closing):
     def connect(cls, endpoint: str = DEFAULT_ENDPOINT, *, timeout_s: float = 5.0) -> Self:
         """Join the router at `endpoint`.
 
+        Parameters
+        ----------
+        endpoint
+            Where the router listens, as PROTOCOL/ADDRESS.
+        timeout_s
+            Seconds to wait for it.
+
         Raises
         ------
+        InvalidMission
+            The endpoint is not valid, or `timeout_s` is no wait (`oxbow.wire.waits`).
         Unavailable
             Nothing answered at `endpoint` within `timeout_s`.
         """
@@ -99,7 +108,20 @@ class Session(Closing):
 
     @classmethod
     def join(cls, endpoint: str, is_over: Callable[[], bool]) -> Self | None:
-        """Join the router at `endpoint`, waiting for one that is not there yet; None once `is_over`."""
+        """Join a router that may not be up yet.
+
+        Parameters
+        ----------
+        endpoint
+            Where the router listens, as PROTOCOL/ADDRESS.
+        is_over
+            Whether to give up, asked about once a second.
+
+        Returns
+        -------
+        Self or None
+            The session; None where it was given up.
+        """
         while not is_over():
             try:
                 return cls.connect(endpoint, timeout_s=1.0)
@@ -128,6 +150,12 @@ class Session(Closing):
 
         Parameters
         ----------
+        key
+            Where to put it.
+        payload
+            The sample, encoded.
+        encoding
+            The MIME type of the payload.
         urgent
             Overtakes other traffic.
         droppable
@@ -138,7 +166,7 @@ class Session(Closing):
         Unavailable
             The session is closed.
         InvalidMission
-            The key is none.
+            The key is not valid.
         """
         priority = zenoh.Priority.INTERACTIVE_HIGH if urgent else zenoh.Priority.DATA
         require_key(key)
@@ -157,6 +185,20 @@ class Session(Closing):
         """Receive samples, one after another, on a thread of this subscription.
 
         Samples that find the queue full are lost, which is logged.
+
+        Parameters
+        ----------
+        key_expr
+            The keys to receive.
+        on_sample
+            Called with the key and the payload of each sample; an exception costs that sample only, and is logged.
+        queue_size
+            Samples that may wait.
+
+        Returns
+        -------
+        Subscription
+            It ends when it or the session is closed.
         """
         mailbox = Mailbox[zenoh.Sample](
             f"subscription {key_expr}",
@@ -175,10 +217,26 @@ class Session(Closing):
     def answer(
         self, key_expr: str | Iterable[str], on_query: OnQuery, *, workers: int = 1, queue_size: int = 64
     ) -> Subscription:
-        """Answer queries (JSON) for one or several key expressions, on `workers` threads.
+        """Answer queries (JSON).
 
-        An `OxbowError` travels to the asker as it is; any other exception is logged and travels as `internal`.
+        An `OxbowError` travels to the asker unchanged; any other exception is logged and travels as `internal`.
         A query that finds the queue full is answered `busy`.
+
+        Parameters
+        ----------
+        key_expr
+            The keys to answer for, as one expression or several.
+        on_query
+            Called with the key, the parameters and the payload of each query; gives the replies.
+        workers
+            Threads that answer, for all of the keys together.
+        queue_size
+            Queries that may wait.
+
+        Returns
+        -------
+        Subscription
+            It ends when it or the session is closed.
         """
         keys = [key_expr] if isinstance(key_expr, str) else list(key_expr)
 
@@ -203,9 +261,20 @@ class Session(Closing):
         return self._keep(Subscription([self.declare_queryable(key, accept) for key in keys], mailbox))
 
     def declare_queryable(self, key: str, accept: Callable[[Query], None]) -> Declared:
-        """Receive queries on the network thread: `accept` must hand them on at once.
+        """Receive queries on the network thread.
 
-        Where it raises, the query is answered `internal`.
+        Parameters
+        ----------
+        key
+            The keys to answer for.
+        accept
+            Called with each query, which it must hand on at once; where it raises, the query is answered
+            `internal`.
+
+        Returns
+        -------
+        Declared
+            To be taken back by `undeclare`; the session does so only when it is closed.
         """
         require_key(key)
 
@@ -229,12 +298,16 @@ class Session(Closing):
         all_targets: bool = False,
         may_be_empty: bool = False,
     ) -> list[tuple[str, bytes]]:
-        """Ask, and return the replies: each a key and a payload.
+        """Ask, and wait for all replies.
 
         Parameters
         ----------
         selector
             A key expression, with ``?name=value;...`` where there are parameters.
+        payload
+            What to send with the question.
+        timeout_s
+            Seconds to wait for the replies.
         attachment
             What travels beside the payload, as the `Envelope` of a request to a stage.
         all_targets
@@ -242,11 +315,16 @@ class Session(Closing):
         may_be_empty
             Return an empty list where nobody answered.
 
+        Returns
+        -------
+        list of (str, bytes)
+            The key and the payload of each reply.
+
         Raises
         ------
         OxbowError
             The error that was replied; `DeadlineExceeded` after `timeout_s`; `Unavailable` where nobody answered;
-            `InvalidMission` where the selector is none, or `timeout_s` is no wait (`oxbow.wire.waits`).
+            `InvalidMission` where the selector is not valid, or `timeout_s` is no wait (`oxbow.wire.waits`).
         """
         found: list[tuple[str, bytes]] = []
         failure: OxbowError | None = None
@@ -309,6 +387,7 @@ class Session(Closing):
                 attachment=attachment,
                 timeout=timeout_s,
                 target=target,
+                # Every reply counts, and the first is of use before the last: none is held back to be merged.
                 consolidation=zenoh.ConsolidationMode.NONE,
                 cancellation_token=cancellation,
             )
@@ -338,12 +417,12 @@ class Session(Closing):
 
 
 def require_key(key: str) -> None:
-    """Refuse a key that zenoh would panic at, and with which it would take the whole session.
+    """Refuse a key at which zenoh would panic, and take the whole session with it.
 
     Raises
     ------
     InvalidMission
-        It is longer than `MOST_KEY_BYTES`, or no Unicode.
+        It is longer than `MOST_KEY_BYTES`, or is not Unicode.
     """
     size = len(key.encode(errors="surrogatepass"))
     if size > MOST_KEY_BYTES or any("\ud800" <= character <= "\udfff" for character in key):
@@ -353,19 +432,37 @@ def require_key(key: str) -> None:
 
 
 def error_of(reply: zenoh.ReplyError, selector: str, timeout_s: float) -> OxbowError:
-    """The exception that an error reply stands for."""
+    """The exception that an error reply stands for.
+
+    Parameters
+    ----------
+    reply
+        Zenoh's time-out, or an error in JSON.
+    selector
+        What was asked, for errors.
+    timeout_s
+        How many seconds the answer was waited for, for errors.
+    """
     if is_timeout(reply):
         return DeadlineExceeded(f"no answer within {timeout_s:.1f} s", where=selector)
     return told_error(reply, selector).error()
 
 
 def is_timeout(reply: zenoh.ReplyError) -> bool:
-    """Whether an error is zenoh's own: plain text, and the only one that reaches a caller is its time-out."""
+    """Whether an error is zenoh's own, which is plain text; of these, only the time-out reaches a caller."""
     return str(reply.encoding) != JSON
 
 
 def told_error(reply: zenoh.ReplyError, selector: str) -> StageError:
-    """The error that was replied; one that cannot be read is `internal`."""
+    """The error that was replied; one that cannot be read is `internal`.
+
+    Parameters
+    ----------
+    reply
+        An error in JSON.
+    selector
+        What was asked, which is where an unreadable error is said to have happened.
+    """
     try:
         return decode_json(reply.payload.to_bytes(), StageError, "error")
     except InvalidMission as error:

@@ -30,7 +30,7 @@ _log = logging.getLogger(__name__)
 
 
 def serve_stage(endpoint: str, handler: str, argv: list[str] | None = None) -> None:
-    """Run one replica of a stage until it is told to end; exits with status 1 where it cannot serve.
+    """Run one replica of a stage until it is asked to end; exits with status 1 where it cannot serve.
 
     Parameters
     ----------
@@ -79,6 +79,7 @@ def _options(handler: str, argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--memory-mb",
         type=_count(LEAST_MEMORY_MB),
+        # As text: argparse then checks it as it does the option, and names what is wrong with the variable.
         default=os.environ.get(MEMORY_VARIABLE, str(DEFAULT_MEMORY_MB)),
         help=f"what the worker process may take, also ${MEMORY_VARIABLE} (default: %(default)s)",
     )

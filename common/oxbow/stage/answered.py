@@ -1,4 +1,4 @@
-"""The last answers of a replica, for a request that is asked again."""
+"""The last answers of a replica, for requests that are asked again."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Answered", "digest", "require_same"]
 
 @dataclass(frozen=True)
 class _Kept:
-    """An answer, and of what."""
+    """An answer, and the digest of its request."""
 
     digest: bytes
     answer: Done | Failed
@@ -32,7 +32,20 @@ class Answered:
         self._bytes = 0
 
     def get(self, request_id: str, request: bytes) -> Done | Failed | None:
-        """The answer to a request, where it is there; `InvalidMission` where it is to another request."""
+        """The answer to a request, None where it is not kept.
+
+        Parameters
+        ----------
+        request_id
+            The id in the request's envelope.
+        request
+            The encoded request.
+
+        Raises
+        ------
+        InvalidMission
+            Another request has the same id.
+        """
         kept = self._kept.get(request_id)
         if kept is None:
             return None
@@ -40,7 +53,17 @@ class Answered:
         return kept.answer
 
     def put(self, request_id: str, request_digest: bytes, answer: Done | Failed) -> None:
-        """Keep the answer to a request, and forget the oldest ones that no longer fit."""
+        """Keep the answer to a request, and forget the oldest ones that no longer fit.
+
+        Parameters
+        ----------
+        request_id
+            The id in the request's envelope.
+        request_digest
+            What `digest` makes of the encoded request.
+        answer
+            The reply or the error.
+        """
         self._forget(self._kept.pop(request_id, None))
         self._kept[request_id] = _Kept(request_digest, answer)
         self._bytes += _size(answer)
@@ -52,12 +75,27 @@ class Answered:
 
 
 def digest(request: bytes) -> bytes:
-    """What tells one request from another."""
+    """What distinguishes an encoded request from others."""
     return hashlib.blake2b(request, digest_size=32).digest()
 
 
 def require_same(request_id: str, known: bytes, request: bytes) -> None:
-    """Refuse a request under the id of another one: it would get the other one's answer."""
+    """Refuse a request under the id of another one: it would get the other one's answer.
+
+    Parameters
+    ----------
+    request_id
+        The id.
+    known
+        The digest of the request that has it.
+    request
+        The encoded request that comes under it now.
+
+    Raises
+    ------
+    InvalidMission
+        The two differ.
+    """
     if digest(request) != known:
         raise InvalidMission(
             f"is {request_id!r}, the id of another request; expected one for each", where="request_id"

@@ -54,6 +54,7 @@ def _end_with_parent(fd: int) -> None:
     A process that is stopped runs no thread; on Linux the kernel kills it. That happens at the end of the thread
     which started this process too: by then the session process takes no more requests.
     """
+    # First the thread: a parent that dies before the call below sends no signal any more, but does hang up.
     threading.Thread(target=_exit_at_hang_up, args=(fd,), name="hang-up", daemon=True).start()
     if sys.platform == "linux":
         ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -61,13 +62,13 @@ def _end_with_parent(fd: int) -> None:
 
 def _exit_at_hang_up(fd: int) -> None:
     poll = select.poll()
-    poll.register(fd, 0)
+    poll.register(fd, 0)  # a hang-up is reported unasked; data is not waited for, which others read
     poll.poll()
     os._exit(0)
 
 
 def _limit_memory(memory_mb: int) -> None:
-    """Have the system refuse more memory of this process's own: code, files and address space do not count."""
+    """Limit the memory of this process's own: code, mapped files and reserved addresses do not count."""
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)
     wanted = memory_mb * 2**20
     resource.setrlimit(

@@ -84,6 +84,7 @@ class Stage:
         self._queryable = session.declare_queryable(self.described.instance_key, self._accept)
         session.answer(self.described.introspection_keys.values(), self._introspect)
         session.answer(f"{self.described.instance_key}/*/**", self._refuse)
+        # Last of all: whoever sees the token asks at once.
         session.declare_live(self.described.live_key)
         _log.info("%s serves %s", self.described.instance_key, worker.handler)
 
@@ -91,6 +92,7 @@ class Stage:
         """Be chosen no more, and answer what has been accepted."""
         self.session.undeclare_live(self.described.live_key)
         self._requests.close()
+        # Until this, whoever still asks is answered `busy`, and so asks another replica at once.
         self._queryable.undeclare()
 
     def _accept(self, query: Query) -> None:
@@ -127,6 +129,7 @@ class Stage:
                 self._busy += 1
                 waiting = len(self._requests)
                 raise Busy(f"takes no more requests now; {waiting} wait", where=self.described.instance_key)
+            # Still under the lock: its worker thread may have the request already, and waits to settle it.
             self._open[envelope.request_id] = exchange
             return None
 
@@ -157,6 +160,7 @@ class Stage:
             self._served += 1
             self._failed += isinstance(answer, Failed)
             self._seconds.append(seconds)
+        # It is no longer open, so that no further query can join it.
         for query in exchange.queries:
             self._reply(query, answer)
 
@@ -210,7 +214,7 @@ class Stage:
             _log.exception("request %s: the answer is lost", answer.request_id)
 
     def _refuse(self, key: str, _parameters: dict[str, str], _payload: bytes) -> Iterator[tuple[str, bytes]]:
-        """Answer whoever asks for a key that is none: silence would look like a replica that is lost."""
+        """Refuse queries for unknown keys: silence would look like a lost replica."""
         keys = (self.described.instance_key, *self.described.introspection_keys.values())
         raise InvalidMission(f"is {excerpt(key)}; expected {', '.join(keys)}", where="key")
 

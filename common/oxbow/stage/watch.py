@@ -1,4 +1,4 @@
-"""Ends a worker process that someone waits for in vain."""
+"""Ends a worker process that would be waited for in vain."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Self
 __all__ = ["Verdict", "Watch", "is_stopped"]
 
 STOPPED_S = 2.0
-"""How long a process may be stopped (SIGSTOP): by a debugger or a shell it is for a moment, else it is frozen."""
+"""How long a process may be stopped (SIGSTOP), as by a debugger or a shell; after that it counts as frozen."""
 
 _SLICE_S = 0.5
 
@@ -44,7 +44,7 @@ class Watch:
     verdict
         Why the process was killed; None where it was not.
     data_bytes
-        The most memory of its own that the process was seen to take; 0 where the system does not tell.
+        The most memory of its own that the process was seen to take; 0 where the system does not report it.
     """
 
     def __init__(self, process: subprocess.Popen[bytes], deadline_s: float) -> None:
@@ -83,6 +83,7 @@ class Watch:
 def is_stopped(pid: int) -> bool:
     """Whether a child of this process is stopped, as by SIGSTOP."""
     try:
+        # WNOWAIT: the state is left to be asked for again.
         return os.waitid(os.P_PID, pid, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
     except ChildProcessError:
         return False
@@ -90,6 +91,7 @@ def is_stopped(pid: int) -> bool:
 
 def _data_bytes(pid: int) -> int:
     try:
+        # The sixth number of statm is data and stack, which is nearly what RLIMIT_DATA limits.
         pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[5])
     except (OSError, IndexError, ValueError):
         return 0

@@ -1,6 +1,6 @@
 """What a stage's session process and its worker process say to each other, over a pipe (MessagePack).
 
-Everything that the worker says of a job carries the job's request id: an answer to another job is none.
+Everything that the worker says of a job carries the job's request id: what has another id is no answer to it.
 """
 
 from __future__ import annotations

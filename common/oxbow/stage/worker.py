@@ -32,8 +32,8 @@ START_S = 30.0
 END_S = 2.0
 
 _FULL_SHARE = 0.5
-"""A process that dies of a fault with so much of its memory taken has died of its limit: the next piece of memory
-that it asked for was the one too many, and libraries in C seldom survive that."""
+"""A process that dies of a fault with this share of its memory taken has died of its limit: the next allocation
+was refused, and libraries in C seldom survive that."""
 
 _FAULTS = {-signal.SIGABRT, -signal.SIGSEGV, -signal.SIGBUS}
 
@@ -88,10 +88,22 @@ class Worker:
         return message
 
     def run(self, job: Job, on_shown: Callable[[Shown], None]) -> Done | Failed:
-        """Run a job, and call `on_shown` with each layer on the way.
+        """Run a job.
 
         Whatever is raised, the process is gone: nothing that it may still say can pass for the answer to another
         job.
+
+        Parameters
+        ----------
+        job
+            The request, with its id and deadline.
+        on_shown
+            Called with each layer on the way.
+
+        Returns
+        -------
+        Done or Failed
+            The encoded reply, or the error that the handler raised.
 
         Raises
         ------
@@ -103,6 +115,7 @@ class Worker:
             The process died for want of memory.
         """
         with self._watched(job.envelope.deadline_s):
+            # What was said before the job was sent cannot be about it.
             if self._pipe.poll():
                 raise self._misconduct(self._receive())
             self._pipe.send_bytes(msgspec.msgpack.encode(job))
@@ -138,6 +151,7 @@ class Worker:
 
     def _launch(self) -> None:
         self._pipe, theirs = Pipe()
+        # The child has a copy of its end. Ours is closed, or the end of the child would never be noticed.
         with theirs:
             fd = theirs.fileno()
             arguments = [str(fd), self.endpoint, self.handler, self.instance, str(self.memory_mb)]
@@ -199,14 +213,32 @@ class Worker:
 
 
 def needs_memory(memory_mb: int, where: str) -> Infeasible:
-    """The error of a request that does not fit."""
+    """The error of a request that does not fit.
+
+    Parameters
+    ----------
+    memory_mb
+        What the worker process may take.
+    where
+        The stage, or its handler.
+    """
     return Infeasible(
         f"needs more than the {memory_mb} MB of memory that a worker process may take (--memory-mb)", where=where
     )
 
 
 def is_want_of_memory(status: int, data_bytes: int, memory_mb: int) -> bool:
-    """Whether a process that ended with this status, when it had so much memory, has died of its limit."""
+    """Whether a process died of its memory limit.
+
+    Parameters
+    ----------
+    status
+        What it ended with; a signal is negative.
+    data_bytes
+        The most memory that it was seen to have.
+    memory_mb
+        Its limit.
+    """
     return status in _FAULTS and data_bytes > _FULL_SHARE * memory_mb * 2**20
 
 
