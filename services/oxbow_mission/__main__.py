@@ -27,12 +27,13 @@ _log = logging.getLogger("oxbow_mission")
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Serve until told to end; exits with status 4 where the store cannot be had, 1 where it fails."""
+    """Serve until asked to end; exits with status 4 where the store cannot be had, 1 where it fails."""
     options = _options(argv)
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s")
     lifetime = Lifetime(options.parent)
     try:
         with Database(options.home, SCHEMA, on_lost=lifetime.end) as database:
+            # The store comes first: a mission that cannot be kept must not be taken in.
             store = Store(database)
             bus = Bus.join(options.connect, lambda: lifetime.over)
             if bus is not None:

@@ -13,7 +13,25 @@ __all__ = ["check"]
 
 
 def check(order: ToHelper, _peer: Peer) -> FromHelper:
-    """Check all of a request, so that its sender hears of every fault at once."""
+    """Check all of a request, so that a fault is reported before the mission is accepted.
+
+    Parameters
+    ----------
+    order
+        A `Check`.
+    _peer
+        The mission service, which is not asked anything.
+
+    Returns
+    -------
+    Checked
+        What the request is to be kept as.
+
+    Raises
+    ------
+    OxbowError
+        What is wrong with the request.
+    """
     assert isinstance(order, Check)
     submission = Submission.parse(order.document, order.parameters)
     Site.of(submission.mission)

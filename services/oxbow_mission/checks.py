@@ -69,12 +69,12 @@ class Checks(Closing):
         self._quick.prepare()
 
     def put(self, incoming: Incoming) -> None:
-        """Have a request checked; one that finds no room is answered `busy`."""
+        """Have a request checked; if there is no room, it is answered `busy`."""
         lane = self._quick if incoming.size <= QUICK_BYTES else self._slow
         lane.put(incoming)
 
     def drop(self, client: str) -> None:
-        """Let go what a client that is gone has waiting."""
+        """Drop what a client that is gone has waiting."""
         for lane in (self._quick, self._slow):
             lane.drop(client)
 
@@ -130,7 +130,7 @@ class _Lane:
         try:
             checked = self._checked(incoming.check(), helper)
             if checked is None:
-                helper.start()
+                helper.start()  # the late one was killed: the next request is not to wait for a new one
                 self._on_late(incoming)
             else:
                 incoming.accept(checked)
@@ -141,13 +141,14 @@ class _Lane:
             raise
 
     def _checked(self, check: Check, helper: Helper) -> Checked | None:
-        """What is to be kept of a request; None where that cannot be told in time."""
+        """What is to be kept of a request; None where the check is not done in time."""
         for losses in range(1, MOST_LOSSES + 1):
             try:
                 outcome = helper.carry_out(check, self.limit_s, _no_answer)
             except DeadlineExceeded:
                 return None
             except HelperDied as error:
+                # A request that kills its helper would kill the next one too.
                 if error.is_own_fault or losses == MOST_LOSSES:
                     raise
                 continue

@@ -44,7 +44,7 @@ class Database(Closing):
 
     What was acknowledged is in this file, so it must not be lost in silence: a file that was removed, replaced,
     cut or overwritten under this process is noticed before the next access, and one that is gone or empty,
-    although missions had been kept in this folder, is not begun anew.
+    although missions had been kept in this folder, is not replaced by a new one.
 
     Parameters
     ----------
@@ -78,6 +78,7 @@ class Database(Closing):
                     contextlib.closing(sqlite3.connect(self.path, check_same_thread=False))
                 )
                 self._set_up(schema)
+                # Not before: a process id in the lock file means that there is a store, which must not vanish.
                 self._mark_held()
                 self._changed_by_others()
             except (OSError, sqlite3.Error) as error:
@@ -97,6 +98,7 @@ class Database(Closing):
             try:
                 yield self._db
             except sqlite3.DatabaseError as error:
+                # Extended codes have the primary one in their lowest byte.
                 if error.sqlite_errorcode & 0xFF in _DAMAGED:
                     self._lose(f"{self.path.name} was damaged ({error})")
                 raise
@@ -105,7 +107,7 @@ class Database(Closing):
     def transaction(self) -> Iterator[sqlite3.Connection]:
         """The connection, for changes that are on the disk when the context is left, or not made at all."""
         with self.reading():
-            with self._db:
+            with self._db:  # commits, or rolls back on whatever is raised
                 yield self._db
             # What was committed to a file that is gone must not be acknowledged.
             self.require_intact()
@@ -180,6 +182,7 @@ class Database(Closing):
         while version != schema.version:
             script = schema.upgrades[version] if version else schema.script
             version = version + 1 if version else schema.version
+            # In one transaction with its version: a file is never between two schemas.
             db.executescript(f"BEGIN; {script} PRAGMA user_version = {version}; COMMIT;")
 
     # ----------------------------------------------------------------- watching

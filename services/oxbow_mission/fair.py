@@ -1,4 +1,4 @@
-"""Shares among clients: whoever had least of late is next, however much the others ask for."""
+"""Shares among clients: whoever had least recently is next, however much the others ask for."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ __all__ = ["FairQueue", "Order", "Turns"]
 T = TypeVar("T")
 
 HALF_LIFE_S = 60.0
-"""How fast it is forgotten how much a client had."""
+"""The time after which what a client had counts half."""
 MOST_KNOWN = 10_000
 LOOK_S = 0.5
-"""How often those who wait for a turn look whether there is more room."""
+"""How often those who wait for a turn check whether there is more room."""
 
 
 @dataclass
@@ -34,29 +34,38 @@ class _Use:
     at_s: float = 0.0
 
     def recent_s(self, now_s: float) -> float:
-        """The seconds that it had, those of long ago hardly counted."""
+        """The seconds that it had; those of long ago hardly count."""
         return self.seconds * math.exp2((self.at_s - now_s) / HALF_LIFE_S)
 
 
 class Order:
-    """Who is to be served next; not safe between threads by itself."""
+    """Who is to be served next; not safe between threads without a lock of its owner's."""
 
     def __init__(self) -> None:
         self._turns = itertools.count(1)
         self._uses: dict[str, _Use] = {}
 
     def next(self, clients: Iterable[str]) -> str:
-        """Which of `clients` had the fewest seconds of late; of those, the one that was served longest ago."""
+        """Which of `clients` had the fewest seconds recently; among equals, the one served longest ago."""
         now_s = time.monotonic()
 
         def had(client: str) -> tuple[float, int]:
             use = self._uses.get(client, _Use())
+            # Rounded, so that clients that had about the same take turns.
             return round(use.recent_s(now_s), 1), use.turn
 
         return min(clients, key=had)
 
     def note(self, client: str, seconds: float = 0.0) -> None:
-        """Note that a client is served, or that it was for so many seconds."""
+        """Note that a client is served now, or that it has been served.
+
+        Parameters
+        ----------
+        client
+            Its name.
+        seconds
+            How long it was served; 0 at the beginning.
+        """
         use, now_s = self._uses.pop(client, _Use()), time.monotonic()
         self._uses[client] = _Use(next(self._turns), use.recent_s(now_s) + seconds, now_s)
         if len(self._uses) > MOST_KNOWN:  # who is forgotten is served as someone new
@@ -91,7 +100,22 @@ class FairQueue(Generic[T]):
         self._closed = False
 
     def put(self, client: str, item: T, size: int) -> None:
-        """Add an item of so many bytes; `Busy` where there is no room for it."""
+        """Add an item.
+
+        Parameters
+        ----------
+        client
+            Whose it is.
+        item
+            What to add.
+        size
+            Its size in bytes.
+
+        Raises
+        ------
+        Busy
+            There is no room for it.
+        """
         with self._changed:
             row = self._rows.get(client, _Row())
             self._require_room(row, size)
@@ -139,12 +163,12 @@ class FairQueue(Generic[T]):
 
 
 class Turns:
-    """Lets so many at a time use something, the clients in turn.
+    """Lets a limited number use something at a time, the clients in turn.
 
     Parameters
     ----------
     room
-        How many may use what is named, which may change.
+        How many may use the thing of this name; the number may change.
     """
 
     def __init__(self, room: Callable[[str], int]) -> None:
@@ -156,7 +180,22 @@ class Turns:
 
     @contextmanager
     def turn(self, what: str, client: str, is_over: Callable[[], bool]) -> Iterator[bool]:
-        """Wait for a turn, and have it while the context lasts; False where `is_over` before there was one."""
+        """Wait for a turn, and have it while the context lasts.
+
+        Parameters
+        ----------
+        what
+            The name of what is used.
+        client
+            Who uses it.
+        is_over
+            Whether to wait no longer, asked at least every half second.
+
+        Yields
+        ------
+        bool
+            Whether there was a turn; False where `is_over` came first.
+        """
         granted = self._acquire(what, client, is_over)
         started = time.monotonic()
         try:
@@ -176,7 +215,7 @@ class Turns:
                 while not is_over():
                     if self._busy[what] < max(1, self._room(what)) and order.next(waiting) == client:
                         self._busy[what] += 1
-                        order.note(client)
+                        order.note(client)  # at once, so that its next request comes after the others'
                         return True
                     self._changed.wait(LOOK_S)
             finally:

@@ -98,6 +98,11 @@ class Helper(Closing):
         answer
             Called with whatever the process asks or shows on the way; what it returns answers what was asked.
 
+        Returns
+        -------
+        Checked, Planned or Failed
+            What became of the order.
+
         Raises
         ------
         DeadlineExceeded
@@ -105,7 +110,7 @@ class Helper(Closing):
         Infeasible
             The process died for want of memory.
         HelperDied
-            The process ended, or said what no helper says.
+            The process ended, or said something that makes no sense.
         """
         self.start()
         if not self._is_up:
@@ -156,6 +161,7 @@ class Helper(Closing):
             said = msgspec.msgpack.decode(data, type=Said)
         except (msgspec.MsgspecError, ValueError) as error:
             raise HelperDied(f"a helper process sent garbage: {error}", is_own_fault=True) from error
+        # A late answer to one order must not pass for the answer to the next.
         if said.order != self._order:
             raise HelperDied(
                 f"a helper process answered order {said.order}, not {self._order}", is_own_fault=False
@@ -176,6 +182,7 @@ class Helper(Closing):
             self._release()
             self._is_up, self._order = False, 0
             self._pipe, theirs = Pipe()
+            # The child has a copy of its end. Ours is closed, or the end of the child would never be noticed.
             with theirs:
                 fd = theirs.fileno()
                 self._process = subprocess.Popen(
@@ -222,6 +229,7 @@ class Helper(Closing):
             return DeadlineExceeded(f"stopped after {limit_s:.1f} s, not done yet", where=STAGE)
         if is_want_of_memory(status, watch.data_bytes, self.memory_mb):
             return needs_memory(self.memory_mb, STAGE)
+        # The kernel's and the operator's ways to end a process; a fault of its own ends it by another signal.
         from_outside = watch.verdict is Verdict.FROZEN or status in (-signal.SIGKILL, -signal.SIGTERM)
         return HelperDied(f"helper process {process.pid} {ended(status)}", is_own_fault=not from_outside)
 
@@ -244,7 +252,7 @@ class Helpers(Closing):
 
     @contextmanager
     def one(self) -> Iterator[Helper]:
-        """A helper, for one order after another of one thread."""
+        """A helper process for one thread, which may give it several orders, one after another."""
         with self._lock:
             helper = self._idle.pop() if self._idle else Helper(self.handler, self.memory_mb)
         try:

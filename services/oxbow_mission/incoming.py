@@ -25,7 +25,7 @@ _log = logging.getLogger(__name__)
 
 
 class PutRequest(Incoming):
-    """A request that was put: its sender hears of it by the mission's status alone."""
+    """A request that was put: its sender learns of the outcome from the mission's status alone."""
 
     def __init__(self, registry: Registry, mission_id: str, document: bytes) -> None:
         self.registry = registry
@@ -81,6 +81,7 @@ class QueriedPlan(QueriedRequest):
         until = self.since + checked.deadline_s + GRACE_S
         waiter = Waiter(self.query, checked.client, until, self.size)
         status = _accepted(self.registry, checked)
+        # The revision may be done already, as where the same mission was handed in before.
         final = self.registry.when_final(status, lambda revision: self.waiters.add(revision, waiter))
         if final.state.is_final:
             waiter.answer(self.registry.store, final)

@@ -56,7 +56,7 @@ class Planner(Closing):
     memory_mb
         What a helper process may take.
     on_failure
-        Called when an outcome cannot be kept or published: this process had better start anew.
+        Called when an outcome cannot be kept or published: this process should then be started anew.
     handler
         What the helper processes do, as ``package.module:attribute``.
     """
@@ -78,7 +78,7 @@ class Planner(Closing):
         self.on_failure = on_failure
         self.failed = False
         self.turns = Turns(lambda stage: len(bus.instances(stage)))
-        bus.patience_s = math.inf
+        bus.patience_s = math.inf  # the deadline alone ends a wait for a stage
         self._audience = bus.audience(any_layer_key(STAGE))
         # Daemons: a stage that does not answer must not keep this process from ending.
         self._threads = [
@@ -108,7 +108,7 @@ class Planner(Closing):
             self.on_failure()
 
     def _plan(self, job: Job) -> bytes | OxbowError:
-        """The plan, or why there is none; here whatever is raised becomes an error."""
+        """The plan, or why there is none; whatever is raised becomes an error."""
         try:
             with self.helpers.one() as helper:
                 run = _Run(job, self, helper, shown=bool(self._audience))
@@ -162,6 +162,7 @@ class _Run:
     def cancel(self) -> None:
         """Stop; whatever a stage still does for this run is waited for by nobody."""
         self.over = True
+        # Ends the wait in `_answer`; if none is under way, `over` is seen at the next question.
         self._answers.put(Answer(error=_STOPPED))
         self.helper.kill()
 

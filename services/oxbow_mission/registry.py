@@ -89,7 +89,22 @@ class Registry(Closing):
     # ----------------------------------------------------------------- taking in
 
     def accept(self, mission_id: str, request: Request, client: str) -> MissionStatus:
-        """Take in a checked mission; the status of a new revision, or of the one that is the same."""
+        """Take in a checked mission.
+
+        Parameters
+        ----------
+        mission_id
+            Its id.
+        request
+            What to plan, and how.
+        client
+            Who handed it in; empty where nobody is named.
+
+        Returns
+        -------
+        MissionStatus
+            That of a new revision, or of the latest one where that is for the same request.
+        """
         with self._changed:
             status = self._current(self.store.accept(mission_id, request, client))
             self._publish_status(status)
@@ -97,10 +112,17 @@ class Registry(Closing):
             return status
 
     def refuse(self, mission_id: str, error: OxbowError) -> None:
-        """Let it be known that a request was refused: its sender may be listening to the status alone.
+        """Publish that a request was refused: its sender may be listening to the status alone.
 
-        Nothing is kept of it, and it takes no revision: where the mission stands remains as it was. An id that
+        Nothing is kept of it, and it takes no revision: the status of the mission itself is unchanged. An id that
         cannot be kept is answered under its percent-encoded form.
+
+        Parameters
+        ----------
+        mission_id
+            The id as it was given, valid or not.
+        error
+            Why it was refused.
         """
         chunk = quote(mission_id, safe="")
         if len(chunk) > MOST_ANSWERED_CHARACTERS:
@@ -163,7 +185,15 @@ class Registry(Closing):
 
     @contextmanager
     def cancellable(self, job: Job, cancel: Callable[[], None]) -> Iterator[None]:
-        """Have `cancel` called where the job is to stop."""
+        """Have a job stopped where it is cancelled, or the registry is closed.
+
+        Parameters
+        ----------
+        job
+            What is being planned.
+        cancel
+            Stops it; called at once where the job was cancelled before.
+        """
         with self._changed:
             running = self._running.get(job.revision)
             if running is None:
@@ -173,7 +203,17 @@ class Registry(Closing):
         yield
 
     def note_progress(self, job: Job, stage: str, fraction: float) -> None:
-        """Publish which stage is at work; this is not kept, since after a crash it is no longer so."""
+        """Publish which stage is at work; this is not kept, since after a crash it is no longer true.
+
+        Parameters
+        ----------
+        job
+            What is being planned; nothing is published where it was cancelled or stopped.
+        stage
+            The stage that is asked.
+        fraction
+            The share of the run that is done, 0 to 1.
+        """
         with self._changed:
             running = self._running.get(job.revision)
             if running is not None:
@@ -191,9 +231,16 @@ class Registry(Closing):
         )
 
     def settle(self, job: Job, outcome: bytes | OxbowError) -> None:
-        """Keep and publish a plan, a completed Mission File, or why there is none.
+        """Keep and publish the outcome of a job.
 
-        The outcome of a run that was cancelled or stopped meanwhile is of no use.
+        That of a run that was cancelled or stopped meanwhile is dropped.
+
+        Parameters
+        ----------
+        job
+            What was planned.
+        outcome
+            The completed Mission File, or why there is none.
         """
         with self._changed:
             if self._running.pop(job.revision, None) is None:
@@ -214,11 +261,13 @@ class Registry(Closing):
     def _announce(self, status: MissionStatus) -> None:
         """Publish an outcome, its plan before its status, and note that this was done."""
         if status.state is MissionState.DONE:
+            # The plan comes first: whoever hears that it is done finds it.
             plan = self.store.plan(Revision.of(status))
             self.bus.publish(mission_key(status.mission_id, "plan"), plan)
             if self.is_replan(Revision.of(status)):
                 self.bus.publish(mission_key(status.mission_id, "replan"), plan)
         self._publish_status(status)
+        # After it was published: a crash in between publishes it twice, which does no harm, rather than never.
         self.store.mark_announced(Revision.of(status))
         self.on_final(status)
 
@@ -233,7 +282,20 @@ class Registry(Closing):
     # ----------------------------------------------------------------- asking
 
     def when_final(self, status: MissionStatus, wait: Callable[[Revision], None]) -> MissionStatus:
-        """The status of a revision; where it is not final, `wait` is called before `on_final` can be."""
+        """Look up a revision's status, or begin to wait for its outcome, with no gap between the two.
+
+        Parameters
+        ----------
+        status
+            A status of the revision.
+        wait
+            Called where the status is not final, before `on_final` can be.
+
+        Returns
+        -------
+        MissionStatus
+            The present one.
+        """
         with self._changed:
             status = self.store.status(Revision.of(status))
             if not status.state.is_final:

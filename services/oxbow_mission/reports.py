@@ -29,6 +29,13 @@ class Reports:
     def add(self, mission_id: str, payload: bytes) -> None:
         """Keep a report.
 
+        Parameters
+        ----------
+        mission_id
+            The mission that it is about.
+        payload
+            The report as guidance sent it.
+
         Raises
         ------
         InvalidMission

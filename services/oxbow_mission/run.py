@@ -29,7 +29,25 @@ MOST_WRONG = 3
 
 
 def plan(order: ToHelper, peer: Peer) -> FromHelper:
-    """Plan a revision of a mission."""
+    """Plan a revision of a mission.
+
+    Parameters
+    ----------
+    order
+        A `Plan`.
+    peer
+        The mission service, by way of which the stages are asked.
+
+    Returns
+    -------
+    Planned
+        The completed Mission File.
+
+    Raises
+    ------
+    OxbowError
+        Why there is no plan.
+    """
     assert isinstance(order, Plan)
     return Run(order, peer).planned()
 
@@ -101,7 +119,7 @@ class Run:
         raise Internal(f"{MOST_WRONG} times replied what is no answer: {wrong}", where=endpoint.stage)
 
     def _show_outcome(self, name: str, text: str) -> None:
-        # Not droppable: it tells the recorder that nothing more will come.
+        # Not droppable: the recorder finishes the recording when this layer comes.
         layer = Layer(stage=STAGE, name=name, kind=LayerKind.LOG, text=text, scalars=self.seconds)
         self._show(layer, droppable=False)
 

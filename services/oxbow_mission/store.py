@@ -1,7 +1,7 @@
 """Everything the mission service must not forget of its missions: requests, revisions and plans.
 
 A change that a method makes is on the disk when the method returns (WAL, synchronous=FULL), so a process
-killed at any moment loses nothing that it had told anyone.
+killed at any moment loses nothing that it had announced.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from oxbow_mission.database import Database, Schema
 __all__ = ["SCHEMA", "Job", "Request", "Revision", "Store"]
 
 MAX_ATTEMPTS = 3
-"""A revision that so many planner processes died of fails."""
+"""A revision fails after this many planner processes died of it."""
 
 SCHEMA = Schema(
     version=2,
@@ -132,6 +132,20 @@ class Store:
 
         A revision that failed for want of a stage, time or luck may well succeed now, so it is asked for anew; one
         that is invalid or infeasible would fail again.
+
+        Parameters
+        ----------
+        mission_id
+            The mission's id.
+        request
+            What to plan, and how.
+        client
+            Who handed it in; empty where nobody is named.
+
+        Returns
+        -------
+        MissionStatus
+            That of the new revision, or of the one that is the same.
         """
         checked_id(mission_id)
         with self.database.transaction() as db:
@@ -193,11 +207,37 @@ class Store:
         return Job(Revision(row["mission_id"], row["revision"]), request, row["client"])
 
     def finish(self, revision: Revision, plan: bytes) -> MissionStatus:
-        """Keep the plan of a claimed revision."""
+        """Keep the plan of a claimed revision, and return its status.
+
+        Parameters
+        ----------
+        revision
+            The revision.
+        plan
+            The completed Mission File.
+
+        Raises
+        ------
+        Internal
+            It is not being planned.
+        """
         return self._settle(revision, MissionState.DONE, plan=plan)
 
     def fail(self, revision: Revision, error: OxbowError) -> MissionStatus:
-        """Keep why a revision that is waiting or being planned has no plan."""
+        """Keep why a revision has no plan, and return its status.
+
+        Parameters
+        ----------
+        revision
+            The revision, which waits or is being planned.
+        error
+            The reason.
+
+        Raises
+        ------
+        Internal
+            It neither waits nor is being planned.
+        """
         return self._settle(revision, MissionState.FAILED, error=error)
 
     def release(self, revision: Revision) -> MissionStatus:
@@ -222,6 +262,7 @@ class Store:
         plan: bytes | None = None,
         error: OxbowError | None = None,
     ) -> MissionStatus:
+        # A revision may be cancelled while it waits; only one that is being planned can be done or released.
         origins = ("planning", "accepted" if state is MissionState.FAILED else "planning")
         with self.database.transaction() as db:
             row = db.execute(
@@ -236,7 +277,7 @@ class Store:
     # ----------------------------------------------------------------- announcing
 
     def unannounced(self) -> list[MissionStatus]:
-        """The outcomes that the world may not have heard of, oldest first."""
+        """The outcomes that may not have been published, oldest first."""
         with self.database.reading() as db:
             rows = db.execute(
                 f"SELECT {_STATUS} FROM revision WHERE NOT announced AND state IN ('done', 'failed')"
@@ -310,7 +351,7 @@ class Store:
 
 
 def _set_aside_unfit(db: sqlite3.Connection) -> None:
-    """Have missions whose id cannot stand in a key wait no more: nobody could be told of them."""
+    """Fail missions whose id cannot stand in a key: their outcome could not be published."""
     cause = InvalidMission("can be no key of the bus", where="id")
     for (mission_id,) in db.execute("SELECT DISTINCT mission_id FROM revision WHERE NOT announced").fetchall():
         if not _fits(mission_id):

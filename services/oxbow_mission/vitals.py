@@ -1,4 +1,4 @@
-"""What the mission service tells about itself, as a stage does: ``@ping``, ``@info`` and ``@stats``."""
+"""What the mission service reports about itself, as a stage does: ``@ping``, ``@info`` and ``@stats``."""
 
 from __future__ import annotations
 
@@ -46,7 +46,15 @@ class Vitals:
         bus.answer(self._answers, self._answer)
 
     def count(self, seconds: float, *, failed: bool) -> None:
-        """Note that a run is over."""
+        """Note that a run is over.
+
+        Parameters
+        ----------
+        seconds
+            How long it took.
+        failed
+            Whether it ended without a plan.
+        """
         with self._lock:
             self._served += 1
             self._failed += failed

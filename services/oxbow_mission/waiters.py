@@ -1,4 +1,4 @@
-"""Queries that wait for a plan: they hold no thread, and are let go when nobody waits for the answer any more."""
+"""Queries that wait for a plan: they hold no thread, and are dropped when nobody waits for the answer any more."""
 
 from __future__ import annotations
 
@@ -33,7 +33,15 @@ class Waiter:
     size: int
 
     def answer(self, store: Store, status: MissionStatus) -> None:
-        """Answer by the plan of a revision that is final, or by why there is none."""
+        """Answer with the plan of a revision, or with the reason why there is none.
+
+        Parameters
+        ----------
+        store
+            Where the plan is kept.
+        status
+            That of the revision, which is final.
+        """
         if status.error is not None:
             self.fail(status.error.error())
             return
@@ -56,7 +64,20 @@ class Waiters:
         self._bytes: Counter[str] = Counter()
 
     def add(self, revision: Revision, waiter: Waiter) -> None:
-        """Have a query wait; `Busy` where too many do."""
+        """Have a query wait.
+
+        Parameters
+        ----------
+        revision
+            What it waits for.
+        waiter
+            The query, and whose it is.
+
+        Raises
+        ------
+        Busy
+            Too many wait already, of this client or in all, or they hold too many bytes.
+        """
         with self._lock:
             own, every = self._counts[waiter.client], self._counts.total()
             own_bytes, every_bytes = self._bytes[waiter.client], self._bytes.total()
@@ -64,6 +85,7 @@ class Waiters:
                 raise _busy(
                     f"{own} queries of this client and {every}", f"fewer than {MOST_PER_CLIENT} and {MOST}"
                 )
+            # The first query of a client may wait however large it is: other clients must not shut it out.
             if own and (own_bytes + waiter.size > MOST_BYTES_PER_CLIENT or every_bytes + waiter.size > MOST_BYTES):
                 raise _busy(
                     f"queries of {own_bytes} bytes of this client and {every_bytes}",
@@ -79,11 +101,12 @@ class Waiters:
             return self._forget(self._waiting.pop(revision, []))
 
     def let_go(self, gone: Collection[str]) -> int:
-        """Let go whose client is gone or whose time is up; return how many these were."""
+        """Drop queries whose client is gone or whose time is up; return how many these were."""
         now = time.monotonic()
         left = self._take_if(lambda waiter: waiter.client in gone)
         late = self._take_if(lambda waiter: waiter.until < now)
         for waiter in left:
+            # Closed without a reply: nobody is there to read one.
             with waiter.query:
                 pass
         for waiter in late:

@@ -1,1 +1,1 @@
-"""The recorder: layers from the bus into one rerun recording a mission. The only package that imports rerun."""
+"""The recorder: layers from the bus into one rerun recording per mission. The only package that imports rerun."""

@@ -31,13 +31,14 @@ _MOST_LOGGED = 300
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Record until told to end; every open file is finished then."""
+    """Record until asked to end; every open file is finished then."""
     options = _options(argv)
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s")
     lifetime = Lifetime(options.parent)
     sweep(options.folder)
     with ExitStack() as held:
         live = held.enter_context(LiveServer(options.live_port)) if options.live_port else None
+        # Entered before the session, and so left after it: no layer comes to files that are being finished.
         runs = held.enter_context(Runs(options.folder, live.address if live else None))
         session = Session.join(options.connect, lambda: lifetime.over)
         if session is not None:

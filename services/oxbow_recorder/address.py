@@ -50,10 +50,17 @@ class _Stamp(msgspec.Struct):
 def address_of(key: str, payload: bytes) -> Address:
     """The address of an encoded `oxbow.wire.recording.Stamped` that was put on `key`.
 
+    Parameters
+    ----------
+    key
+        Where the layer was put.
+    payload
+        The encoded layer.
+
     Raises
     ------
     InvalidMission
-        It is no such message or too large, an id of it is none, or the key says something else than the message.
+        It is no such message or too large, one of its ids is not valid, or the key does not match the message.
     """
     if len(payload) > MOST_LAYER_BYTES:
         raise InvalidMission(f"is {len(payload)} bytes; expected at most {MOST_LAYER_BYTES}", where="layer")

@@ -1,4 +1,4 @@
-"""What an engineer sees first: a tab a stage, the map, and the log with the timings."""
+"""What an engineer sees first: a tab per stage, the map, and the log with the timings."""
 
 from __future__ import annotations
 

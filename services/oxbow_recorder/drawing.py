@@ -60,9 +60,9 @@ TEAM: tuple[Colour, ...] = (
     (240, 98, 146),
     (176, 190, 197),
 )
-"""Colours of what is told apart, in turn: vehicles, and kinds of a graph's nodes."""
+"""Colours that distinguish vehicles, or kinds of a graph's nodes, in turn."""
 BY_VEHICLE = frozenset({("assignment", "shares"), ("assignment", "sorties"), ("certificate", "path")})
-"""Layers that have one geometry a vehicle, all in the same order: share or sortie, and path."""
+"""Layers that have one geometry per vehicle, all in the same order: share or sortie, and path."""
 NEAR, FAR = np.array([38, 166, 154]), np.array([229, 57, 53])
 """Ends of the scale for values from 0 to 1."""
 
@@ -89,6 +89,15 @@ def draw(layer: Layer, frame: Frame | None, part: str = "") -> Iterator[Drawn]:
     """Everything that one layer logs; the map's share only where the frame is known.
 
     Layers of several vehicles or roles, the parts of a mission, lie beside one another.
+
+    Parameters
+    ----------
+    layer
+        What a stage showed.
+    frame
+        The site's plane; None where its origin is not known.
+    part
+        The vehicle or role that the layer is about, where there are several.
     """
     within = f"/{rr.escape_entity_path_part(part)}" if part else ""
     entity = f"{layer.stage}/{layer.name}{within}"
@@ -192,6 +201,7 @@ def _strip_labels(layer: Layer, owners: list[int]) -> list[str] | None:
     """The label of each geometry at its first line; its further ones, as the islands of a polygon, have none."""
     if not layer.labels:
         return None
+    # Reversed, so that of several lines of a geometry the first is kept.
     first = dict(reversed([(owner, number) for number, owner in enumerate(owners)]))
     return [layer.labels[owner] if first[owner] == number else "" for number, owner in enumerate(owners)]
 
@@ -204,7 +214,7 @@ def _points(geometries: tuple[BaseGeometry, ...]) -> tuple[FloatArray, list[int]
 
 
 def _colours(layer: Layer) -> np.ndarray[tuple[int, int], np.dtype[np.uint8]]:
-    """One colour a geometry: by value, by vehicle, or the layer's, or the palette's."""
+    """One colour per geometry: by value, by vehicle, or the layer's, or the palette's."""
     if layer.values:
         share = np.clip(np.asarray(layer.values), 0.0, 1.0)[:, None]
         return np.asarray(NEAR + share * (FAR - NEAR), dtype=np.uint8)

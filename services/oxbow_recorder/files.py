@@ -14,7 +14,7 @@ from oxbow_recorder.address import Run
 __all__ = ["holds", "part_path", "recording_id", "recording_path", "sweep"]
 
 ABANDONED_S = 24 * 3600.0
-"""A part to which nothing was added for so long is nobody's: the recorder that wrote it was killed."""
+"""A part to which nothing was added for this long is abandoned: the recorder that wrote it was killed."""
 
 _HEAD_BYTES = 2**18
 """The part of a recording in which its id stands, after 64 KiB of blueprint."""
@@ -24,23 +24,58 @@ _log = logging.getLogger("oxbow_recorder")
 
 
 def recording_path(folder: Path, run: Run) -> Path:
-    """Where the recording of a run ends up; an older one of its mission is replaced as a whole."""
+    """Where the recording of a run ends up; an older one of its mission is replaced as a whole.
+
+    Parameters
+    ----------
+    folder
+        Where recordings are kept.
+    run
+        The run.
+
+    Raises
+    ------
+    InvalidMission
+        The mission's id would lead out of the folder.
+    """
     return _within(folder, f"{run.mission_id}.rrd")
 
 
 def part_path(folder: Path, run: Run) -> Path:
-    """Where the recording of a run is written; the run is shortened, since names of files are limited."""
+    """Where the recording of a run is written until it is finished.
+
+    Parameters
+    ----------
+    folder
+        Where recordings are kept.
+    run
+        The run.
+
+    Raises
+    ------
+    InvalidMission
+        The mission's id would lead out of the folder.
+    """
+    # Names of files are limited to 255 bytes: two ids of 128 characters are too long for one.
     digest = hashlib.sha256(run.run_id.encode()).hexdigest()[:16]
     return _within(folder, f".{run.mission_id}.{digest}.part.rrd")
 
 
 def recording_id(run: Run) -> str:
-    """What viewers tell recordings apart by, which stands in the head of its file; none is a part of another."""
+    """The id by which viewers distinguish recordings, found in the head of its file; none is part of another."""
     return f"{run.mission_id} ({run.run_id})"
 
 
 def holds(path: Path, run: Run) -> bool:
-    """Whether there is a recording of this very run at `path`, be it by another process."""
+    """Whether there is a recording of this very run, perhaps by another process.
+
+    Parameters
+    ----------
+    path
+        The file, which need not exist.
+    run
+        The run.
+    """
     try:
         with path.open("rb") as file:
             return recording_id(run).encode() in file.read(_HEAD_BYTES)

@@ -42,7 +42,7 @@ def main(argv: list[str]) -> None:
                 pipe.send_bytes(_DONE)
     except (EOFError, OSError):
         recordings.close()
-    os._exit(0)  # rerun would wait, maybe for ever, for files that could not be written
+    os._exit(0)  # rerun might wait forever for files that could not be written
 
 
 def _follow(order: ToWriter, recordings: Recordings) -> None:

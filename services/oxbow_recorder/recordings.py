@@ -20,13 +20,13 @@ from oxbow_recorder.files import part_path, recording_id, recording_path
 __all__ = ["Recording", "Recordings"]
 
 FLUSH_S = 5.0
-"""How long what is left of a recording may take to be written: where a disk is full, rerun may wait for ever."""
+"""How long what is left of a recording may take to be written: where a disk is full, rerun may wait forever."""
 
 LEAVE_S = 1.0
 """How long viewers may take to be served what is left; where nobody serves them, rerun takes some seconds more."""
 
 _ABANDONED: list[rr.RecordingStream] = []
-"""Streams whose files could not be written: leaving one may wait for ever."""
+"""Streams whose files could not be written: to leave one may take forever, so they are kept until the end."""
 
 _log = logging.getLogger("oxbow_recorder")
 
@@ -68,6 +68,7 @@ class Recording:
         """Draw one layer."""
         layer = stamped.layer
         frame = None if stamped.origin is None else Frame(*stamped.origin)
+        # Drawn once, for the file and for the viewers.
         drawn = tuple(draw(layer, frame, stamped.part))
         for stream in self._streams:
             stream.set_time("time", timestamp=stamped.time_s)
@@ -90,7 +91,7 @@ class Recording:
     def _writing(self) -> Iterator[None]:
         try:
             yield
-        except (OSError, RuntimeError) as error:  # rerun raises RuntimeError, for a full disk, too
+        except (OSError, RuntimeError) as error:  # rerun raises RuntimeError, also for a full disk
             _ABANDONED.append(self._file)
             with suppress(OSError):
                 self._part.unlink(missing_ok=True)
@@ -125,8 +126,22 @@ class Recordings:
         """None stands for a recording that could not be begun: its layers have nowhere to go."""
 
     def add(self, run: Run, stamped: Stamped) -> None:
-        """Draw a layer in its run's recording, which the first one begins."""
+        """Draw a layer in its run's recording, which the first one begins.
+
+        Parameters
+        ----------
+        run
+            The run that the layer belongs to.
+        stamped
+            The layer, and when and where it was shown.
+
+        Raises
+        ------
+        Unavailable
+            The recording cannot be begun; further layers of the run are passed over.
+        """
         if run not in self._open:
+            # First None, which stays where the recording cannot be begun: it is tried only once.
             self._open[run] = None
             self._open[run] = Recording(self.folder, run, self.viewers)
         recording = self._open[run]

@@ -1,7 +1,7 @@
 """Which runs are recorded, and by which process: admission, ends, and bounds on everything.
 
 Whoever is on the bus can put layers under any number of ids. What is kept of a run is bounded, and the run of a
-mission that is planned, which shows many layers, is let go after those that have shown few.
+mission that is planned, which shows many layers, is given up only after those that have shown few.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MOST_WRITERS = 4
 """Processes that write recordings, at the same time."""
 
 MOST_BEGUN = 32
-"""Recordings that one process begins: rerun keeps 2 MB and four threads of each."""
+"""Recordings that one process begins: rerun keeps 2 MB and four threads for each, which only its end frees."""
 
 MOST_WAITING = 512
 MOST_WAITING_BYTES = 64 * 2**20
@@ -38,13 +38,13 @@ MOST_REMEMBERED = 10_000
 """Runs that are known to be over."""
 
 WAIT_S = 1.0
-"""How long a run waits for a second layer, without which it is recorded where nothing else is to be done."""
+"""How long a run waits for a second layer; after that it is recorded if there is room."""
 
 RECENT_S = 30.0
-"""A run that has shown something within this time is at work."""
+"""A run that has shown something within this time is active."""
 
 IDLE_S = 900.0
-"""A run that has shown nothing for so long is over."""
+"""A run that has shown nothing for this long is over."""
 
 SPARE_S = 60.0
 """How long a process is kept that has no run to record."""
@@ -106,7 +106,20 @@ class Runs(Closing):
         self._writers = [self._current]
 
     def take(self, key: str, payload: bytes) -> None:
-        """Take in a layer as it was put on `key`; `InvalidMission` where it is none. Never waits."""
+        """Take in a layer. Never waits.
+
+        Parameters
+        ----------
+        key
+            Where the layer was put.
+        payload
+            An encoded `oxbow.wire.recording.Stamped`.
+
+        Raises
+        ------
+        InvalidMission
+            It is no layer, or not of this key (`oxbow_recorder.address`).
+        """
         address = address_of(key, payload)
         with self._lock:
             run = address.run
@@ -141,7 +154,7 @@ class Runs(Closing):
             return any(writer.fill > 0 and not writer.has_died() for writer in self._writers)
 
     def close(self) -> None:
-        """Finish every recording, of what waits, too."""
+        """Finish every recording, including those of runs that wait."""
         give_up = time.monotonic() + END_S
         with self._lock:
             for waiting in tuple(self._waiting.values()):
@@ -151,6 +164,7 @@ class Runs(Closing):
             for recorded in tuple(self._open.values()):
                 self._finish(recorded)
             writers, self._writers = self._writers, []
+        # All are asked to end before any is waited for, so that they finish side by side.
         for writer in writers:
             writer.end()
         for writer in writers:
@@ -189,6 +203,8 @@ class Runs(Closing):
         if writer is None:
             return False
         self._leave(waiting)
+        # A recorder that was stopped may have finished this run before: its last layers alone must not replace the
+        # whole recording.
         if holds(recording_path(self.folder, run), run):
             self._remember(run)
             self._note_late(run)
@@ -205,7 +221,7 @@ class Runs(Closing):
         return True
 
     def _least(self) -> _Open:
-        """The recorded run to let go: one that shows nothing any more, or else the one that has shown least."""
+        """The recorded run to give up: one that is no longer active, or else the one that has shown least."""
         recent = self._clock() - RECENT_S
         return min(self._open.values(), key=lambda each: (each.seen > recent, each.layers, each.seen))
 

@@ -17,7 +17,7 @@ MEMORY_LIMIT = "256MiB"
 
 
 def main(argv: list[str]) -> None:
-    """Serve viewers on a port until told to end."""
+    """Serve viewers on a port until asked to end."""
     port, parent = map(int, argv)
     lifetime = Lifetime(parent)
     stream = rr.RecordingStream("oxbow")

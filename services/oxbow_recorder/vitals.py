@@ -1,4 +1,4 @@
-"""What the recorder tells about itself, as a stage does: ``@ping``, ``@info`` and ``@stats``."""
+"""What the recorder reports about itself, as a stage does: ``@ping``, ``@info`` and ``@stats``."""
 
 from __future__ import annotations
 
@@ -29,7 +29,17 @@ class Counts:
 
 
 def answer_introspection(session: Session, instance: str, counts: Callable[[], Counts]) -> None:
-    """Answer for this process on the bus, as the replica `instance`."""
+    """Answer for this process on the bus.
+
+    Parameters
+    ----------
+    session
+        The bus.
+    instance
+        The name to answer under.
+    counts
+        Gives the present figures.
+    """
     started_s = time.time()
 
     def ping() -> Ping:

@@ -27,7 +27,7 @@ END_S = 8.0
 """How long a process may take to finish its files once it has nothing else to do."""
 
 STUCK_S = 15.0
-"""How long a process may take for one layer or file: where a disk is full, rerun may wait for ever."""
+"""How long a process may take for one layer or file: where a disk is full, rerun may wait forever."""
 
 _log = logging.getLogger("oxbow_recorder")
 
@@ -47,9 +47,9 @@ class Writer:
     begun
         Recordings that it was given to begin, as its owner counts.
     is_ending
-        It has been told to end.
+        It has been asked to end.
     failed
-        It ended otherwise than it was told to.
+        It ended without being asked to, or with an error.
     """
 
     def __init__(self, folder: Path, viewers: str | None = None) -> None:
@@ -73,7 +73,20 @@ class Writer:
         return max(self._waiting_bytes / MOST_WAITING_BYTES, self._waiting / MOST_WAITING)
 
     def draw(self, run: Run, payload: bytes) -> bool:
-        """Have a layer drawn; False where too much waits already."""
+        """Have a layer drawn.
+
+        Parameters
+        ----------
+        run
+            The run that it belongs to.
+        payload
+            The encoded layer.
+
+        Returns
+        -------
+        bool
+            False where too much waits already, and the layer is dropped.
+        """
         if self._waiting >= MOST_WAITING or self._waiting_bytes + len(payload) > MOST_WAITING_BYTES:
             return False
         self._put(msgspec.msgpack.encode(Draw(run=run, payload=payload)))
@@ -105,7 +118,7 @@ class Writer:
         self._thread.join()
 
     def kill_if_stuck(self) -> None:
-        """Kill a process that gets on no more, which costs what it has not finished."""
+        """Kill a process that makes no progress, at the cost of what it has not finished."""
         since = self._busy_since
         if since is not None and time.monotonic() - since > STUCK_S:
             _log.error("%s: nothing could be written for %.0f s; the writer is killed", self._folder, STUCK_S)
