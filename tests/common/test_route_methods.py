@@ -266,6 +266,16 @@ def test_waters_apart_are_infinitely_far(method):
 
 
 @every_method
+def test_a_table_has_no_line_over_land(method):
+    waters = MultiPolygon([box(0, 0, 100, 100), box(200, 0, 300, 100)])
+    table = make_router(method, waters).table([(50.0, 50.0), (250.0, 50.0), (60.0, 60.0)])
+    for start, goal in ((0, 1), (1, 0)):
+        with pytest.raises(Infeasible, match=rf"points\[{goal}\]: no way leads from points\[{start}\]"):
+            table.polyline(start, goal)
+    assert np.array_equal(table.polyline(0, 2)[[0, -1]], [(50.0, 50.0), (60.0, 60.0)])
+
+
+@every_method
 def test_a_place_is_no_way_from_itself(method):
     router = make_router(method, scene(3))
     place = places_in(scene(3), 1, 0)[0]

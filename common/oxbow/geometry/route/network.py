@@ -154,6 +154,8 @@ class NetworkRouter:
         def polyline(start: int, goal: int) -> FloatArray:
             if start == goal:
                 return points[[start, goal]]
+            if not np.isfinite(costs[start, goal]):
+                raise Infeasible(f"no way leads from points[{start}] to points[{goal}]", where=f"points[{goal}]")
             there = not is_back[start, goal]
             return self._line(found, start, goal) if there else self._line(found, goal, start)[::-1]
 

@@ -71,8 +71,7 @@ class RouteTable:
         Of the cheapest routes: in metres, with and without the cost of danger. Symmetric, 0 on the diagonal, inf
         where no water leads from one place to the other.
     polyline
-        The route from one place to another, by their numbers, shape (k, 2). Only where the cost is finite: what it
-        returns for other pairs is not a route.
+        The route from one place to another, by their numbers, shape (k, 2); `Infeasible` where the cost is inf.
     """
 
     costs: FloatArray
