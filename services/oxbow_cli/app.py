@@ -129,7 +129,7 @@ def plan(
     )
     from oxbow_cli.destination import Destination, writing
     from oxbow_cli.home import recordings_folder
-    from oxbow_cli.planning import Job, plan_embedded, plan_here, plan_on
+    from oxbow_cli.planning import PlanningJob, plan_embedded, plan_here, plan_on
 
     require_compatible(local=local, connect=connect, record=record, time_limit_s=time_limit, timeout_s=timeout)
     completed = Destination.of(output or file, inputs=[prior])
@@ -142,7 +142,9 @@ def plan(
         method, seed=seed, heading_deg=heading, time_limit_s=time_limit, smooth=smooth, draw=draw
     )
     with report.progress_bar(shown=not json) as progress:
-        job = Job(mission, options, timeout, progress, keep=lambda planned: completed.keep(mission_json(planned)))
+        job = PlanningJob(
+            mission, options, timeout, progress, keep=lambda planned: completed.keep(mission_json(planned))
+        )
         if local:
             planned = plan_here(job)
         elif connect is not None:

@@ -29,7 +29,7 @@ from oxbow_cli.local import local_call
 from oxbow_cli.scratch import scratch_folder
 from oxbow_cli.stack import StackSettings, running_stack
 
-__all__ = ["Job", "Planned", "Progress", "plan_embedded", "plan_here", "plan_on"]
+__all__ = ["Planned", "PlanningJob", "Progress", "plan_embedded", "plan_here", "plan_on"]
 
 CONNECT_S = 3.0
 """How long a router and a mission service may take to answer; where they are up, they do in milliseconds."""
@@ -44,7 +44,7 @@ Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
-class Job:
+class PlanningJob:
     """A mission to plan, how, for how long, whom to tell how far it is, and what to do with the plan.
 
     `keep` is called with the completed mission as soon as there is one, before anything else can fail.
@@ -65,7 +65,7 @@ class Planned:
     recording: Path | None = None
 
 
-def plan_here(job: Job) -> Planned:
+def plan_here(job: PlanningJob) -> Planned:
     """Plan in this process, without a bus and without a recording."""
     with _deadline(job.timeout_s):
         call = _Reported(local_call(), job.progress, expected_calls(job.mission))
@@ -74,7 +74,7 @@ def plan_here(job: Job) -> Planned:
     return Planned(planned)
 
 
-def plan_on(job: Job, endpoint: str) -> Planned:
+def plan_on(job: PlanningJob, endpoint: str) -> Planned:
     """Plan on the stack that listens at `endpoint`; its recorder keeps the recording."""
 
     def note(status: MissionStatus) -> None:
@@ -91,7 +91,7 @@ def plan_on(job: Job, endpoint: str) -> Planned:
     return Planned(planned)
 
 
-def plan_embedded(job: Job, recording: Path | None, recordings: Path) -> Planned:
+def plan_embedded(job: PlanningJob, recording: Path | None, recordings: Path) -> Planned:
     """Plan on a stack of this command's own, which is stopped afterwards.
 
     Parameters

@@ -20,7 +20,7 @@ from oxbow.runtime.closing import Closing
 from oxbow_mission.fair import Turns
 from oxbow_mission.helper import Helper, HelperDied, Helpers
 from oxbow_mission.registry import Registry
-from oxbow_mission.store import MAX_ATTEMPTS, Job
+from oxbow_mission.store import MAX_ATTEMPTS, QueuedMission
 from oxbow_mission.vitals import Vitals
 from oxbow_mission.wire import STAGE, Answer, Ask, Plan, Planned, Show
 
@@ -107,7 +107,7 @@ class Planner(Closing):
             self.failed = True
             self.on_failure()
 
-    def _plan(self, job: Job) -> bytes | OxbowError:
+    def _plan(self, job: QueuedMission) -> bytes | OxbowError:
         """The plan, or why there is none; whatever is raised becomes an error."""
         try:
             with self.helpers.one() as helper:
@@ -124,7 +124,7 @@ class Planner(Closing):
 class _Run:
     """One revision being planned by a helper process."""
 
-    def __init__(self, job: Job, planner: Planner, helper: Helper, *, shown: bool) -> None:
+    def __init__(self, job: QueuedMission, planner: Planner, helper: Helper, *, shown: bool) -> None:
         self.job = job
         self.planner = planner
         self.helper = helper

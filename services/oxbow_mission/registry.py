@@ -20,7 +20,7 @@ from oxbow.contracts import MissionKey, MissionState, MissionStatus, mission_key
 from oxbow.errors import Cancelled, ErrorReply, Internal, InvalidMission, OxbowError
 from oxbow.runtime.closing import Closing
 from oxbow_mission.fair import Order
-from oxbow_mission.store import Job, Request, Revision, Store
+from oxbow_mission.store import QueuedMission, Request, Revision, Store
 
 __all__ = ["Registry"]
 
@@ -159,7 +159,7 @@ class Registry(Closing):
 
     # ----------------------------------------------------------------- planning
 
-    def claim(self) -> Job | None:
+    def claim(self) -> QueuedMission | None:
         """Wait for a revision to plan, and take it; None once the registry is closed."""
         with self._changed:
             while not self._closed:
@@ -172,7 +172,7 @@ class Registry(Closing):
                 self._changed.wait()
         return None
 
-    def _next_job(self) -> Job | None:
+    def _next_job(self) -> QueuedMission | None:
         """A revision of the client that has the fewest being planned, and was served longest ago of these."""
         running = Counter(each.client for each in self._running.values())
         waiting = [client for client in self.store.waiting_clients() if running[client] < self.most_running]
@@ -184,7 +184,7 @@ class Registry(Closing):
         return self.store.claim(client)
 
     @contextmanager
-    def cancellable(self, job: Job, cancel: Callable[[], None]) -> Iterator[None]:
+    def cancellable(self, job: QueuedMission, cancel: Callable[[], None]) -> Iterator[None]:
         """Have a job stopped where it is cancelled, or the registry is closed.
 
         Parameters
@@ -202,7 +202,7 @@ class Registry(Closing):
                 running.cancels.append(cancel)
         yield
 
-    def note_progress(self, job: Job, stage: str, fraction: float) -> None:
+    def note_progress(self, job: QueuedMission, stage: str, fraction: float) -> None:
         """Publish which stage is at work; this is not kept, since after a crash it is no longer true.
 
         Parameters
@@ -220,7 +220,7 @@ class Registry(Closing):
                 running.status = self._planning(job, stage, fraction)
                 self._publish_status(running.status)
 
-    def _planning(self, job: Job, stage: str, fraction: float) -> MissionStatus:
+    def _planning(self, job: QueuedMission, stage: str, fraction: float) -> MissionStatus:
         return MissionStatus(
             mission_id=job.revision.mission_id,
             revision=job.revision.number,
@@ -230,7 +230,7 @@ class Registry(Closing):
             time_s=time.time(),
         )
 
-    def settle(self, job: Job, outcome: bytes | OxbowError) -> None:
+    def settle(self, job: QueuedMission, outcome: bytes | OxbowError) -> None:
         """Keep and publish the outcome of a job.
 
         That of a run that was cancelled or stopped meanwhile is dropped.

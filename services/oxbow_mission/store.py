@@ -18,7 +18,7 @@ from oxbow.contracts import MissionState, MissionStatus, checked_id
 from oxbow.errors import ErrorCode, ErrorReply, Internal, InvalidMission, OxbowError
 from oxbow_mission.database import Database, Schema
 
-__all__ = ["SCHEMA", "Job", "Request", "Revision", "Store"]
+__all__ = ["SCHEMA", "QueuedMission", "Request", "Revision", "Store"]
 
 MAX_ATTEMPTS = 3
 """A revision fails after this many planner processes died of it."""
@@ -101,7 +101,7 @@ class Revision:
 
 
 @dataclass(frozen=True)
-class Job:
+class QueuedMission:
     """A revision claimed for planning, and whose it is."""
 
     revision: Revision
@@ -191,7 +191,7 @@ class Store:
             ).fetchall()
         return [row["client"] for row in rows]
 
-    def claim(self, client: str | None = None) -> Job | None:
+    def claim(self, client: str | None = None) -> QueuedMission | None:
         """Take the oldest accepted revision, of one client or of all, for planning; None where nothing waits."""
         with self.database.transaction() as db:
             row = db.execute(
@@ -204,7 +204,7 @@ class Store:
         if row is None:
             return None
         request = Request(row["document"], row["parameters"], row["fingerprint"])
-        return Job(Revision(row["mission_id"], row["revision"]), request, row["client"])
+        return QueuedMission(Revision(row["mission_id"], row["revision"]), request, row["client"])
 
     def finish(self, revision: Revision, plan: bytes) -> MissionStatus:
         """Keep the plan of a claimed revision, and return its status.

@@ -7,7 +7,7 @@ from scipy.spatial.distance import cdist
 
 from oxbow.arrays import FloatArray
 from oxbow.contracts import Role, Vehicle
-from oxbow_assignment.targets.assignment import Assignment
+from oxbow_assignment.targets.assignment import TargetAssignment
 from oxbow_assignment.targets.problem import Objective, Problem
 
 SIDE_M = 1_000.0
@@ -59,7 +59,7 @@ def random_problem(
     return problem(places[:targets], fleet, objective=objective, **more)
 
 
-def require_sound(problem: Problem, assignment: Assignment) -> None:
+def require_sound(problem: Problem, assignment: TargetAssignment) -> None:
     """Every target is once in a tour or among the unserved; every tour is as long as it says, and within range."""
     served = [target for tour in assignment.tours for target in tour.targets]
     assert sorted([*served, *(unserved.target for unserved in assignment.unserved)]) == list(range(problem.count))

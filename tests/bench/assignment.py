@@ -19,7 +19,7 @@ from oxbow.contracts import Vehicle
 from oxbow.geometry.route import RouteMethod, Router, make_router
 from oxbow.site.site import Site
 from oxbow_assignment.targets.assign import Clustering, ClusterMethod, assign, cluster_paths
-from oxbow_assignment.targets.assignment import Assignment, assignment_of
+from oxbow_assignment.targets.assignment import TargetAssignment, assignment_of
 from oxbow_assignment.targets.joint import gap_to, is_available, optimise
 from oxbow_assignment.targets.problem import Objective, Problem
 
@@ -116,7 +116,7 @@ def _scene(objective: Objective, share: float, seed: int, patience: int) -> dict
     }
 
 
-def _gap(assignment: Assignment, joint: Assignment) -> Figure:
+def _gap(assignment: TargetAssignment, joint: TargetAssignment) -> Figure:
     """In %; nothing where one serves more than the other."""
     gap = gap_to(assignment, joint).relative
     return "" if gap is None else 100.0 * gap

@@ -8,7 +8,7 @@ from shapely import Polygon, box
 
 from oxbow.arrays import FloatArray
 from oxbow.geometry.route import NO_DANGER, Danger, RouteMethod, Router, make_router
-from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.route.mesh import WaterMesh
 from oxbow.geometry.route.network import NetworkRouter
 from oxbow.geometry.route.tessellation import Tessellation
 
@@ -46,5 +46,5 @@ def scene_router(method: RouteMethod, water: Polygon, danger: Danger = NO_DANGER
     """The router of a method, that of the tessellation over a coarse lattice."""
     if method is not RouteMethod.TESSELLATION:
         return make_router(method, water, danger)
-    coarse = Tessellation(Mesh.of(water, danger.outlines), danger, side_m=COARSE_M)
+    coarse = Tessellation(WaterMesh.of(water, danger.outlines), danger, side_m=COARSE_M)
     return NetworkRouter(coarse, method, coarse.reduced)

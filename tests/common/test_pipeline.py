@@ -242,10 +242,10 @@ def test_the_same_mission_gives_the_same_plan(kind):
 
 
 def test_progress_never_runs_backwards():
-    from oxbow_cli.planning import Job, plan_here
+    from oxbow_cli.planning import PlanningJob, plan_here
 
     heard = []
-    job = Job(
+    job = PlanningJob(
         mission("map&treat", [*boats("master", 3), *boats("slave", 1)]),
         OPTIONS,
         60.0,

@@ -16,7 +16,7 @@ from oxbow.geometry.route import RouteMethod, make_router, visibility
 from oxbow.geometry.route.channel import Channel
 from oxbow.geometry.route.funnel import funnel_line
 from oxbow.geometry.route.incenters import incenters
-from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.route.mesh import WaterMesh
 from oxbow.geometry.route.network import NetworkRouter
 from oxbow.geometry.route.sights import sights
 from oxbow.geometry.route.tessellation import RINGS, Tessellation, lattice
@@ -59,7 +59,7 @@ def brute_force(water, points):
 @quick
 @given(seed=seeds)
 def test_bends_that_look_about_by_and_by_see_what_they_see_at_once(seed):
-    mesh = Mesh.of(scene(seed))
+    mesh = WaterMesh.of(scene(seed))
     at_once = VisibilityGraph(mesh).arcs
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(visibility, "EYES", 3)
@@ -77,7 +77,7 @@ def test_what_bends_see_along_straight_channels_is_sought_for_some_of_them_at_a_
 
     monkeypatch.setattr(visibility, "EYES", 10)
     monkeypatch.setattr(visibility, "sights", counted)
-    graph = VisibilityGraph(Mesh.of(scene(1)))
+    graph = VisibilityGraph(WaterMesh.of(scene(1)))
     assert len(graph.arcs.tails) > 0
     assert sum(eyes_at_once) == len(graph.places)
     assert max(eyes_at_once) <= 10 < len(graph.places)
@@ -197,14 +197,14 @@ def test_reduced_ways_over_the_lattice_are_nearly_exact(seed):
     water = scene(seed, obstacles=4)
     points = places_in(water, 6, seed)
     exact = make_router(RouteMethod.VISIBILITY, water).distances(points)
-    fine = Tessellation(Mesh.of(water), side_m=1.5)
+    fine = Tessellation(WaterMesh.of(water), side_m=1.5)
     near = NetworkRouter(fine, RouteMethod.TESSELLATION, fine.reduced).distances(points)
     off = ~np.eye(len(points), dtype=bool)
     assert (near[off] <= 1.015 * exact[off]).all()
 
 
 def test_a_lattice_needs_a_side():
-    mesh = Mesh.of(box(0, 0, 100, 100))
+    mesh = WaterMesh.of(box(0, 0, 100, 100))
     for side_m in (0.0, -1.0, np.nan, np.inf, 0.01):
         with pytest.raises(InvalidMission, match=r"side_m: is .*expected a finite number >= 0\.1"):
             Tessellation(mesh, side_m=side_m)

@@ -16,7 +16,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from oxbow.contracts import MissionState
 from oxbow.errors import Infeasible, Internal, InvalidMission, OxbowError, Unavailable
 from oxbow_mission.database import Database
-from oxbow_mission.store import SCHEMA, Job, Request, Revision, Store
+from oxbow_mission.store import SCHEMA, QueuedMission, Request, Revision, Store
 
 
 def request(content: str) -> Request:
@@ -35,7 +35,7 @@ def store(tmp_path: Path) -> Iterator[Store]:
         yield found
 
 
-def claimed(store: Store) -> Job:
+def claimed(store: Store) -> QueuedMission:
     job = store.claim()
     assert job is not None
     return job
@@ -188,7 +188,7 @@ class Walk(RuleBasedStateMachine):
         self.store = Store(Database(self.home, SCHEMA))
         self.contents: dict[str, list[str]] = {}
         self.plans: dict[Revision, bytes] = {}
-        self.jobs: list[Job] = []
+        self.jobs: list[QueuedMission] = []
 
     def teardown(self) -> None:
         self.store.database.close()

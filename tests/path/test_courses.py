@@ -10,7 +10,7 @@ from shapely import LineString, Point, affinity, box
 
 from oxbow.contracts import Method, PathPlan, PathRequest
 from oxbow.errors import Infeasible
-from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.route.mesh import WaterMesh
 from oxbow.wire.recording import discard
 from oxbow_path.course import best_plan
 from oxbow_path.course.loops import Middles
@@ -111,11 +111,11 @@ def test_half_a_moat_is_named():
 def test_a_loop_round_a_chain_of_islands_holds_them_all():
     islands = [box(x, 10, x + 80, 90) for x in (10, 100, 190)]
     water = box(0, 0, 280, 100).difference(shapely.union_all(islands))
-    loops = list(Middles.of(Mesh.of(water, detail_m=5.0)).loops(10.0, 1e4))
+    loops = list(Middles.of(WaterMesh.of(water, detail_m=5.0)).loops(10.0, 1e4))
     assert all(shapely.Polygon(loops[-1]).contains(island) for island in islands)
     assert loops[-1].length == pytest.approx(2 * (270 + 90), rel=0.05)
-    assert not list(Middles.of(Mesh.of(water, detail_m=5.0)).loops(2.0, 1e4))
-    assert not list(Middles.of(Mesh.of(water, detail_m=5.0)).loops(10.0, 100.0))
+    assert not list(Middles.of(WaterMesh.of(water, detail_m=5.0)).loops(2.0, 1e4))
+    assert not list(Middles.of(WaterMesh.of(water, detail_m=5.0)).loops(10.0, 100.0))
 
 
 def test_the_ends_of_long_arms_are_reached_where_length_is_plentiful():

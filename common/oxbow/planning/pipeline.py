@@ -43,7 +43,7 @@ __all__ = ["expected_calls", "plan_mission"]
 
 
 @dataclass(frozen=True)
-class Task:
+class MissionTask:
     """What every step of a mission works with."""
 
     mission: Mission
@@ -104,7 +104,7 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
     fields = {f"places[{index}]": field for index, field in enumerate(site.ends)}
     with renamed(fields | {"least_width_m": "Least_width"}):
         space = call(CONTOUR, contour)
-    task = Task(mission, options, site, space, call)
+    task = MissionTask(mission, options, site, space, call)
     teams = [
         treatment(task) if role is Role.SLAVE and site.hot_spots else survey(task, site.team(role))
         for role in mission.mission_type.roles
@@ -112,7 +112,7 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
     return completed(mission, options, site, task.space, teams)
 
 
-def survey(task: Task, team: Sequence[Member]) -> TeamPlan:
+def survey(task: MissionTask, team: Sequence[Member]) -> TeamPlan:
     """Cover the free space: one vehicle all of it, several a share each.
 
     Parameters
@@ -140,7 +140,7 @@ def survey(task: Task, team: Sequence[Member]) -> TeamPlan:
     return TeamPlan(vehicles, _certified(task, vehicles), assignment)
 
 
-def treatment(task: Task) -> TeamPlan:
+def treatment(task: MissionTask) -> TeamPlan:
     """Treat the hot spots: a sortie for each slave, as far as its length goes."""
     team = {member.vehicle.name: member for member in task.site.team(Role.SLAVE)}
     request = AssignRequest(
@@ -186,7 +186,7 @@ def expected_calls(mission: Mission) -> int:
 # --------------------------------------------------------------------------- one question to a stage each
 
 
-def _shared(task: Task, team: Sequence[Member]) -> Assignment:
+def _shared(task: MissionTask, team: Sequence[Member]) -> Assignment:
     """Share the free space out. A vehicle that surveys does a master's work, whatever its role."""
     vehicles = tuple(msgspec.structs.replace(member.vehicle, role=Role.MASTER) for member in team)
     request = AssignRequest(
@@ -201,13 +201,13 @@ def _shared(task: Task, team: Sequence[Member]) -> Assignment:
         return task.call(ASSIGN, request)
 
 
-def _shared_part(task: Task, member: Member, harbour: Harbour, share: Polygon) -> VehiclePlan:
+def _shared_part(task: MissionTask, member: Member, harbour: Harbour, share: Polygon) -> VehiclePlan:
     with member.named():
         approach = harbour.approach(share, member.vehicle)
     return _covered(task, member, approach, share.area)
 
 
-def _covered(task: Task, member: Member, approach: Approach, water_m2: float) -> VehiclePlan:
+def _covered(task: MissionTask, member: Member, approach: Approach, water_m2: float) -> VehiclePlan:
     """A path over all of a space, with the legs to it."""
     with member.named():
         length_m = approach.length_m(member.vehicle.length_m)
@@ -237,14 +237,16 @@ def _unused(path: LineString, plan: PathPlan, member: Member, length_m: float) -
     return (f"uses {share:.1%} of its longest length: its legs are shorter than what was kept for them",)
 
 
-def _decomposed(task: Task, member: Member, space: FreeSpace, water_m2: float, length_m: float) -> Decomposition:
+def _decomposed(
+    task: MissionTask, member: Member, space: FreeSpace, water_m2: float, length_m: float
+) -> Decomposition:
     spacing_m = nominal_spacing_m(water_m2, length_m, task.mission.minimal_spatial_rate_m or 0.0)
     request = DecomposeRequest(free=space.free, spacing_m=spacing_m, heading_rad=task.options.heading_rad)
     return task.call(DECOMPOSE, request, part=task.part(member))
 
 
 def _path(
-    task: Task, member: Member, approach: Approach, decomposition: Decomposition, length_m: float
+    task: MissionTask, member: Member, approach: Approach, decomposition: Decomposition, length_m: float
 ) -> PathPlan:
     options = task.options
     with renamed({"min_spacing_m": "Minimal_spatial_rate"}):
@@ -266,7 +268,7 @@ def _path(
     return task.call(PATH, request, part=task.part(member))
 
 
-def _certified(task: Task, vehicles: Sequence[VehiclePlan], areas: tuple[Polygon, ...] = ()) -> Certificate:
+def _certified(task: MissionTask, vehicles: Sequence[VehiclePlan], areas: tuple[Polygon, ...] = ()) -> Certificate:
     """The certificate of a team's paths, none of which breaks a rule of the water."""
     first, *others = (_track(plan) for plan in vehicles)
     certificate = task.call(

@@ -14,7 +14,7 @@ import numpy as np
 
 from oxbow.arrays import Indices
 from oxbow.errors import InvalidMission
-from oxbow_assignment.targets.assignment import Assignment, assignment_of
+from oxbow_assignment.targets.assignment import TargetAssignment, assignment_of
 from oxbow_assignment.targets.clustering import Clusters, cluster_by_radius, fuzzy_c_means, k_means
 from oxbow_assignment.targets.exchange import exchanged
 from oxbow_assignment.targets.insertion import inserted, traded, trimmed
@@ -97,7 +97,7 @@ class Clustered:
         How badly the clusters' space represents the routes; see `PseudoCoordinates`.
     """
 
-    assignment: Assignment
+    assignment: TargetAssignment
     targets: Indices
     clusters: Clusters | None
     owners: Indices

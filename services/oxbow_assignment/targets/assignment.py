@@ -10,11 +10,11 @@ import numpy as np
 from oxbow.arrays import FloatArray, Indices
 from oxbow_assignment.targets.problem import COST, LENGTH, Objective, Problem
 
-__all__ = ["Assignment", "Tour", "Unserved", "assignment_of", "tour_figures", "tour_length"]
+__all__ = ["TargetAssignment", "Unserved", "VehicleTour", "assignment_of", "tour_figures", "tour_length"]
 
 
 @dataclass(frozen=True)
-class Tour:
+class VehicleTour:
     """What one vehicle does: its targets in order, from its start to its recovery.
 
     A vehicle without targets stays where it is: 0 m. `cost_s` is its duration plus the price of danger on its way.
@@ -48,7 +48,7 @@ class Unserved:
 
 
 @dataclass(frozen=True)
-class Assignment:
+class TargetAssignment:
     """Tours, one per vehicle, each within its vehicle's range; every target is in one tour or unserved.
 
     Parameters
@@ -63,7 +63,7 @@ class Assignment:
         The summed value of the targets that are visited.
     """
 
-    tours: tuple[Tour, ...]
+    tours: tuple[VehicleTour, ...]
     unserved: tuple[Unserved, ...]
     objective: Objective
     value: float
@@ -121,7 +121,7 @@ def tour_length(problem: Problem, vehicle: int, path: Indices) -> float:
     return float(tour_figures(problem, vehicle, path)[LENGTH])
 
 
-def assignment_of(problem: Problem, paths: Sequence[Indices]) -> Assignment:
+def assignment_of(problem: Problem, paths: Sequence[Indices]) -> TargetAssignment:
     """The assignment in which each vehicle travels its path.
 
     Parameters
@@ -133,7 +133,7 @@ def assignment_of(problem: Problem, paths: Sequence[Indices]) -> Assignment:
     """
     figures = np.array([tour_figures(problem, vehicle, path) for vehicle, path in enumerate(paths)])
     tours = tuple(
-        Tour(
+        VehicleTour(
             vehicle=vehicle.name,
             targets=tuple(path[1:-1].tolist()),
             length_m=float(own[LENGTH]),
@@ -145,7 +145,7 @@ def assignment_of(problem: Problem, paths: Sequence[Indices]) -> Assignment:
     # Summed in order of targets, so that rounding gives the same targets the same value, whoever visits them.
     served = np.array(sorted(target for tour in tours for target in tour.targets), dtype=int)
     left = np.setdiff1d(np.arange(problem.count), served)
-    return Assignment(
+    return TargetAssignment(
         tours=tours,
         unserved=_unserved(problem, paths, figures[:, LENGTH], left),
         objective=problem.objective,

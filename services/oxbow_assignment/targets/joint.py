@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 from oxbow.errors import Unavailable
 from oxbow_assignment.targets.assign import Clustered, Clustering, assign
-from oxbow_assignment.targets.assignment import Assignment, assignment_of
+from oxbow_assignment.targets.assignment import TargetAssignment, assignment_of
 from oxbow_assignment.targets.problem import Objective, Problem
 
-__all__ = ["PATIENCE", "Gap", "Solution", "gap_to", "is_available", "optimise", "solve"]
+__all__ = ["PATIENCE", "Gap", "JointSolution", "gap_to", "is_available", "optimise", "solve"]
 
 PATIENCE = 2_000
 """Iterations without improvement after which a search ends: a few seconds for 60 targets."""
@@ -44,15 +44,15 @@ class Gap:
 
 
 @dataclass(frozen=True)
-class Solution:
+class JointSolution:
     """The clustered assignment, the joint one if there is one, and the gap between them."""
 
     clustered: Clustered
-    joint: Assignment | None
+    joint: TargetAssignment | None
     gap: Gap
 
     @property
-    def best(self) -> Assignment:
+    def best(self) -> TargetAssignment:
         """Whichever of the two serves more value, or the same value at less cost."""
         if self.joint is None:
             return self.clustered.assignment
@@ -66,7 +66,7 @@ class Solution:
 
 def solve(
     problem: Problem, clustering: Clustering | None = None, *, patience: int | None = PATIENCE, seed: int = 0
-) -> Solution:
+) -> JointSolution:
     """Assign by clusters, and compare that with the joint optimiser.
 
     Parameters
@@ -78,9 +78,9 @@ def solve(
     """
     clustered = assign(problem, clustering)
     if patience is None or not is_available():
-        return Solution(clustered, None, Gap(None, NOT_ASKED if patience is None else MISSING))
+        return JointSolution(clustered, None, Gap(None, NOT_ASKED if patience is None else MISSING))
     joint = optimise(problem, patience=patience, seed=seed)
-    return Solution(clustered, joint, gap_to(clustered.assignment, joint))
+    return JointSolution(clustered, joint, gap_to(clustered.assignment, joint))
 
 
 def is_available() -> bool:
@@ -88,7 +88,7 @@ def is_available() -> bool:
     return importlib.util.find_spec("pyvrp") is not None
 
 
-def optimise(problem: Problem, *, patience: int = PATIENCE, seed: int = 0) -> Assignment:
+def optimise(problem: Problem, *, patience: int = PATIENCE, seed: int = 0) -> TargetAssignment:
     """The best assignment that PyVRP's iterated local search finds; ranges are capacities.
 
     A search ends by iterations, not by time: the same problem and seed give the same assignment. PyVRP cannot
@@ -127,7 +127,7 @@ def optimise(problem: Problem, *, patience: int = PATIENCE, seed: int = 0) -> As
     return best
 
 
-def gap_to(assignment: Assignment, joint: Assignment) -> Gap:
+def gap_to(assignment: TargetAssignment, joint: TargetAssignment) -> Gap:
     """The gap between two assignments of one problem, if they serve the same value.
 
     Parameters

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from oxbow.arrays import Indices
 from oxbow.errors import InvalidMission
 from oxbow_assignment.targets.assign import mended
-from oxbow_assignment.targets.assignment import Assignment, assignment_of
+from oxbow_assignment.targets.assignment import TargetAssignment, assignment_of
 from oxbow_assignment.targets.insertion import trimmed
 from oxbow_assignment.targets.problem import Problem
 
@@ -35,8 +35,8 @@ class Reassignment:
         Names of the vehicles that give up a current target that they could have kept.
     """
 
-    assignment: Assignment
-    kept: Assignment
+    assignment: TargetAssignment
+    kept: TargetAssignment
     changed: tuple[str, ...]
 
 
@@ -90,7 +90,7 @@ class _Candidate:
 
     paths: Sequence[Indices]
     bound: frozenset[int]
-    assignment: Assignment
+    assignment: TargetAssignment
     changed: tuple[int, ...]
 
     @classmethod

@@ -21,18 +21,18 @@ from oxbow.arrays import FloatArray, Indices
 from oxbow.contracts import Vehicle
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.geometry.route import NO_DANGER, Danger, RouteMethod, Router, RouteTable, leg_routes, way_to
-from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.route.mesh import WaterMesh
 from oxbow.geometry.route.methods import router_on
 from oxbow_assignment.targets.problem import LENGTH
 
-__all__ = ["Fleet", "Ways"]
+__all__ = ["Fleet", "FleetWays"]
 
 MARGIN = 1e-9
 """Fraction of each range that is kept back for rounding."""
 
 
 @dataclass(frozen=True)
-class Ways:
+class FleetWays:
     """The best routes of v slaves from and to the ends of n lines; figures are cost and length, in metres.
 
     Parameters
@@ -178,7 +178,7 @@ class Fleet:
         """Length of each leg out, then of each leg home, shape (2 v,)."""
         return shapely.length(np.array([*self.out, *self.home]))
 
-    def ways(self, lines: Sequence[LineString], spots: Sequence[str] = ()) -> Ways:
+    def ways(self, lines: Sequence[LineString], spots: Sequence[str] = ()) -> FleetWays:
         """The best routes between the ends of some lines, and from and to the slaves.
 
         Parameters
@@ -205,7 +205,7 @@ class Fleet:
         from_docks = np.stack(docked, axis=1)
         from_docks = (from_docks + self._legs_m.reshape(2, boats, 1)).reshape(2, 2, boats, count, 2)
         between = figures[:, :, : 2 * count, : 2 * count].reshape(2, boats, count, 2, count, 2)
-        return Ways(
+        return FleetWays(
             starts=from_docks[:, 0],
             recoveries=from_docks[:, 1],
             between=between.transpose(0, 1, 2, 4, 3, 5),
@@ -230,8 +230,8 @@ class Fleet:
         return np.maximum(own[:, :, None], own[:, None, :])
 
     @cached_property
-    def _mesh(self) -> Mesh:
-        return Mesh.of(self.free, self.danger.outlines)
+    def _mesh(self) -> WaterMesh:
+        return WaterMesh.of(self.free, self.danger.outlines)
 
     @cached_property
     def _routers(self) -> dict[float, Router]:

@@ -14,10 +14,10 @@ from oxbow.arrays import FloatArray, Indices
 from oxbow.errors import Internal
 from oxbow.tolerances import ROUNDING_M
 from oxbow_assignment.targets.assign import Clustering
-from oxbow_assignment.targets.joint import Solution, solve
+from oxbow_assignment.targets.joint import JointSolution, solve
 from oxbow_assignment.targets.problem import COST, LENGTH, Objective, Problem
 from oxbow_assignment.treatment.division import Part
-from oxbow_assignment.treatment.fleet import Fleet, Ways
+from oxbow_assignment.treatment.fleet import Fleet, FleetWays
 from oxbow_assignment.treatment.lines import joined
 
 __all__ = ["Journey", "Schedule", "scheduled"]
@@ -64,7 +64,7 @@ class Schedule:
     """
 
     rounds: tuple[tuple[Journey, ...], ...]
-    first: Solution | None
+    first: JointSolution | None
 
 
 def scheduled(parts: Sequence[Part], fleet: Fleet, *, seed: int = 0) -> Schedule:
@@ -93,7 +93,7 @@ def scheduled(parts: Sequence[Part], fleet: Fleet, *, seed: int = 0) -> Schedule
     ways = fleet.ways([part.line for part in parts], [part.spot for part in parts])
     left = np.arange(len(parts))
     rounds: list[tuple[Journey, ...]] = []
-    first: Solution | None = None
+    first: JointSolution | None = None
     while len(left):
         patience = PATIENCE if first is None and len(left) <= JOINT_MOST else None
         solution = solve(_problem(parts, fleet, ways, left), Clustering(seed=seed), patience=patience, seed=seed)
@@ -108,7 +108,7 @@ def scheduled(parts: Sequence[Part], fleet: Fleet, *, seed: int = 0) -> Schedule
     return Schedule(tuple(rounds), first)
 
 
-def _problem(parts: Sequence[Part], fleet: Fleet, ways: Ways, left: Indices) -> Problem:
+def _problem(parts: Sequence[Part], fleet: Fleet, ways: FleetWays, left: Indices) -> Problem:
     """The problem of what is left: mean ways between parts, with half of the parts' lengths on either side."""
     count, boats = len(left), len(fleet.slaves)
     rows = count + 2 * boats
@@ -131,7 +131,7 @@ def _problem(parts: Sequence[Part], fleet: Fleet, ways: Ways, left: Indices) -> 
     )
 
 
-def _journey(slave: int, tour: Indices, parts: Sequence[Part], fleet: Fleet, ways: Ways) -> Journey:
+def _journey(slave: int, tour: Indices, parts: Sequence[Part], fleet: Fleet, ways: FleetWays) -> Journey:
     """The path of one tour with its parts in the best orientation, checked."""
     turns = _turns(slave, tour, ways, fleet.slaves[slave].length_m)
     numbers = tour.tolist()
@@ -153,7 +153,7 @@ def _journey(slave: int, tour: Indices, parts: Sequence[Part], fleet: Fleet, way
     return Journey(slave, tuple(tour.tolist()), path, tuple(routes))
 
 
-def _turns(slave: int, tour: Indices, ways: Ways, range_m: float) -> list[int]:
+def _turns(slave: int, tour: Indices, ways: FleetWays, range_m: float) -> list[int]:
     """Which parts to travel backwards (1), for the cheapest path within range.
 
     If the cheapest path is too long, metres count more and more, until at last the shortest path is taken: that
@@ -166,7 +166,7 @@ def _turns(slave: int, tour: Indices, ways: Ways, range_m: float) -> list[int]:
     return turns
 
 
-def _best_turns(slave: int, tour: Indices, ways: Ways, weights: FloatArray) -> list[int]:
+def _best_turns(slave: int, tour: Indices, ways: FleetWays, weights: FloatArray) -> list[int]:
     """The turns of least weighted cost and length, by dynamic programming along the tour."""
     starts, recoveries = (np.tensordot(weights, of[:, slave], 1) for of in (ways.starts, ways.recoveries))
     so_far = starts[tour[0]]
@@ -182,7 +182,7 @@ def _best_turns(slave: int, tour: Indices, ways: Ways, weights: FloatArray) -> l
     return turns[::-1]
 
 
-def _length_m(slave: int, tour: Indices, turns: Sequence[int], ways: Ways) -> float:
+def _length_m(slave: int, tour: Indices, turns: Sequence[int], ways: FleetWays) -> float:
     """Metres of a tour with its parts turned."""
     enters = np.array(turns)
     hops = ways.between[LENGTH, slave, tour[:-1], tour[1:], 1 - enters[:-1], enters[1:]].sum()

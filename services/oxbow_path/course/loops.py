@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from shapely import LinearRing
 
 from oxbow.arrays import FloatArray, Indices, Mask
-from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.route.mesh import WaterMesh
 from oxbow_path.walk.region import largest
 
 __all__ = ["Middles"]
@@ -49,7 +49,7 @@ class Middles:
     exterior: int
 
     @classmethod
-    def of(cls, mesh: Mesh) -> Middles:
+    def of(cls, mesh: WaterMesh) -> Middles:
         """The middles of a triangulated water: triangles with corners on two shores or three."""
         shore = _shore_of_points(mesh)
         tail = shore[mesh.triangles]
@@ -127,7 +127,7 @@ class Middles:
         return None if faces.is_empty else largest(faces).exterior
 
 
-def _shore_of_points(mesh: Mesh) -> Indices:
+def _shore_of_points(mesh: WaterMesh) -> Indices:
     """The number of the shore that each vertex lies on, shape (n,): the shores' sides join their vertices."""
     corners = mesh.triangles.ravel()
     heads = np.roll(mesh.triangles, -1, axis=1).ravel()

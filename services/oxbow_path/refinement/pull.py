@@ -13,7 +13,7 @@ from oxbow.arrays import FloatArray, Indices
 from oxbow_path.refinement.polyline import Polyline
 from oxbow_path.refinement.samples import Samples
 
-__all__ = ["Feet", "Pull", "Solution", "feet"]
+__all__ = ["Feet", "Pull", "PullSolution", "feet"]
 
 STEP = 0.15
 """The nearest segment of a sample is looked for among points of the path this far apart, in spacings."""
@@ -93,7 +93,7 @@ def feet(path: Polyline, points: FloatArray, spacing_m: float) -> Feet:
 
 
 @dataclass(frozen=True)
-class Solution:
+class PullSolution:
     """Where the nodes (n, 2) would go, and under which tension."""
 
     nodes: FloatArray
@@ -175,7 +175,7 @@ class Pull:
         banded = np.vstack([np.append(0.0, beside * free), diagonal])
         return np.asarray(solveh_banded(banded, right, check_finite=False))
 
-    def fitted(self, length_m: float, tension: float | None, spacing_m: float) -> Solution:
+    def fitted(self, length_m: float, tension: float | None, spacing_m: float) -> PullSolution:
         """The solution about as long as `length_m`, and no longer where the tensions tried suffice for that.
 
         Parameters
@@ -199,4 +199,4 @@ class Pull:
                 low = middle
             else:
                 high = middle
-        return Solution(self.solved(high), high)
+        return PullSolution(self.solved(high), high)

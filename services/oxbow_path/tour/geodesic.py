@@ -22,7 +22,7 @@ from scipy.spatial import cKDTree
 from shapely import MultiPoint, Polygon
 
 from oxbow.arrays import FloatArray, Indices
-from oxbow.geometry.route.mesh import Mesh, Touches
+from oxbow.geometry.route.mesh import Touches, WaterMesh
 from oxbow.geometry.triangles import following
 from oxbow_path.tour.sight import Sight
 
@@ -62,7 +62,7 @@ class Shore:
     def __init__(self, free: Polygon) -> None:
         shapely.prepare(free)
         self.free = free
-        self._mesh = Mesh.of(free)
+        self._mesh = WaterMesh.of(free)
         self._sight = Sight(free)
         self._corners, sectors = self._mesh.sector_places, self._mesh.sectors
         places, place, count = np.unique(self._corners, axis=0, return_inverse=True, return_counts=True)

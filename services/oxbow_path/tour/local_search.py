@@ -18,7 +18,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from oxbow.arrays import Indices
-from oxbow_path.tour.solver import Solution
+from oxbow_path.tour.solver import TourSolution
 from oxbow_path.tour.start import Start
 
 __all__ = ["shortened"]
@@ -52,7 +52,7 @@ LEAST_GAIN = 1e-9
 Step = Callable[[int], int]
 
 
-def shortened(start: Start, *, seed: int) -> Solution:
+def shortened(start: Start, *, seed: int) -> TourSolution:
     """Shorten a tour: a `Solver`.
 
     Parameters
@@ -77,7 +77,7 @@ def shortened(start: Start, *, seed: int) -> Solution:
             gained_m = sum(search.kick(chances) for chances in kicks[first : first + ROUND].tolist())
             if gained_m < LEAST_ROUND * start.length_m(search.order):
                 break
-    return Solution(search.order, "2-opt and Or-opt")
+    return TourSolution(search.order, "2-opt and Or-opt")
 
 
 @dataclass(frozen=True)

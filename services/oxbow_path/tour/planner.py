@@ -20,7 +20,7 @@ from oxbow_path.tour.outline import enclosed
 from oxbow_path.tour.pruning import pruned
 from oxbow_path.tour.pyvrp_solver import is_installed, polished
 from oxbow_path.tour.sites import clustered, low_discrepancy, with_gaps
-from oxbow_path.tour.solver import Solution, Solver
+from oxbow_path.tour.solver import Solver, TourSolution
 from oxbow_path.tour.start import first_tour
 from oxbow_path.walk.gaps import branch_to
 from oxbow_path.walk.region import Brush, Circuit, Walk, clear_of_land, simply_connected
@@ -220,10 +220,10 @@ class _Attempt:
         centres = clustered(self._samples, count, self.waters.free)
         return with_gaps(np.vstack([entries, centres]), self.waters.probe.points, GAP * pitch_m)
 
-    def _solution(self, geodesics: Geodesics, near_m: float) -> Solution:
+    def _solution(self, geodesics: Geodesics, near_m: float) -> TourSolution:
         """A short tour; of fewer than four sites there is only one."""
         if geodesics.count < LEAST_SITES:
-            return Solution(np.arange(geodesics.count), "")
+            return TourSolution(np.arange(geodesics.count), "")
         return self.solver(first_tour(geodesics, near_m), seed=self.seed)
 
 

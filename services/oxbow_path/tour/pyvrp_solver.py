@@ -14,7 +14,7 @@ import numpy as np
 
 from oxbow.arrays import Indices
 from oxbow_path.tour.local_search import shortened
-from oxbow_path.tour.solver import Solution
+from oxbow_path.tour.solver import TourSolution
 from oxbow_path.tour.start import Start
 
 __all__ = ["is_installed", "polished"]
@@ -36,7 +36,7 @@ def is_installed() -> bool:
     return find_spec("pyvrp") is not None
 
 
-def polished(start: Start, *, seed: int) -> Solution:
+def polished(start: Start, *, seed: int) -> TourSolution:
     """Shorten a tour by the project's own search, then by PyVRP's: a `Solver`.
 
     Parameters
@@ -57,7 +57,7 @@ def polished(start: Start, *, seed: int) -> Solution:
     order = _solved(start, own.order, seed)
     is_near = bool(np.asarray(start.distances[order, np.roll(order, -1)]).all())
     shorter = is_near and start.length_m(order) < start.length_m(own.order)
-    return Solution(order, "PyVRP") if shorter else own
+    return TourSolution(order, "PyVRP") if shorter else own
 
 
 def _solved(start: Start, order: Indices, seed: int) -> Indices:

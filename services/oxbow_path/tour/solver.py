@@ -8,11 +8,11 @@ from typing import Protocol
 from oxbow.arrays import Indices
 from oxbow_path.tour.start import Start
 
-__all__ = ["Solution", "Solver"]
+__all__ = ["Solver", "TourSolution"]
 
 
 @dataclass(frozen=True)
-class Solution:
+class TourSolution:
     """A closed tour: every site once, in this order; and what found it."""
 
     order: Indices
@@ -22,6 +22,6 @@ class Solution:
 class Solver(Protocol):
     """Shortens a closed tour; the same start and seed give the same tour."""
 
-    def __call__(self, start: Start, *, seed: int) -> Solution:
+    def __call__(self, start: Start, *, seed: int) -> TourSolution:
         """Shorten `start`, by legs between near sites alone."""
         ...

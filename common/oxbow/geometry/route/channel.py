@@ -14,7 +14,7 @@ import numpy as np
 
 from oxbow.arrays import FloatArray
 from oxbow.geometry.route.danger import NO_DANGER, Danger
-from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.route.mesh import WaterMesh
 from oxbow.geometry.route.network import Ends, Links, Way
 from oxbow.geometry.route.search import Arcs
 
@@ -54,7 +54,7 @@ class Gates:
         The danger zones, as they count for one vehicle.
     """
 
-    mesh: Mesh
+    mesh: WaterMesh
     danger: Danger = NO_DANGER
 
     @cached_property

@@ -19,7 +19,7 @@ from shapely import MultiPolygon, Polygon, STRtree
 from oxbow.arrays import FloatArray, Geometries, Mask
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.geometry.route.danger import NO_DANGER, Danger
-from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.route.mesh import WaterMesh
 from oxbow.geometry.route.methods import router_on
 from oxbow.geometry.route.retriangulation import GRID_M, retriangulated
 from oxbow.geometry.route.route import Route, RouteMethod, Router, RouteTable
@@ -56,7 +56,7 @@ class DynamicRouter:
         *,
         method: RouteMethod = RouteMethod.INCENTERS,
     ) -> None:
-        self._open_water = Mesh.of(shapely.set_precision(water, GRID_M))
+        self._open_water = WaterMesh.of(shapely.set_precision(water, GRID_M))
         self._danger = danger
         self._method = method
         self._obstacles: dict[str, Polygon] = {}
@@ -142,7 +142,7 @@ class DynamicRouter:
 class _Site:
     """Open water with obstacles in it."""
 
-    open_water: Mesh
+    open_water: WaterMesh
     obstacles: tuple[Polygon, ...]
 
     def shores_near(self, areas: Geometries) -> Geometries:

@@ -6,7 +6,7 @@ import numpy as np
 from shapely import MultiPolygon, Polygon
 
 from oxbow.arrays import FloatArray
-from oxbow.geometry.route.mesh import Mesh, Touches
+from oxbow.geometry.route.mesh import Touches, WaterMesh
 from oxbow.geometry.route.network import Ends
 from oxbow.geometry.route.search import Arcs, cheapest_ways, distinct
 from oxbow.geometry.route.sights import sights
@@ -38,7 +38,7 @@ def lengths_from(water: Polygon | MultiPolygon, sources: FloatArray, places: Flo
     Infeasible
         A source lies outside the water; `where` is ``sources[k]``.
     """
-    graph = VisibilityGraph(Mesh.of(water))
+    graph = VisibilityGraph(WaterMesh.of(water))
     mesh, bends = graph.mesh, graph.bends
     ends = Ends(sources, mesh.touches(sources, [f"sources[{number}]" for number in range(len(sources))]))
     links, first = graph.links(ends), len(bends.places)

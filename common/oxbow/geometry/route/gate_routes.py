@@ -20,7 +20,7 @@ from shapely.geometry.base import BaseGeometry
 from oxbow.arrays import FloatArray, Indices
 from oxbow.errors import Internal
 from oxbow.geometry.route.channel import Gates
-from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.route.mesh import WaterMesh
 from oxbow.geometry.route.search import Arcs, WaysTo, cheapest_ways, cheapest_ways_to
 
 __all__ = ["Inward", "Routes", "taut"]
@@ -45,9 +45,9 @@ class Routes:
         self.detail_m = detail_m
 
     @cached_property
-    def mesh(self) -> Mesh:
+    def mesh(self) -> WaterMesh:
         """The water in triangles, its shore in edges no longer than the detail."""
-        return Mesh.of(self.water, detail_m=self.detail_m)
+        return WaterMesh.of(self.water, detail_m=self.detail_m)
 
     @cached_property
     def _gates(self) -> Gates:

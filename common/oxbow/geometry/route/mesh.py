@@ -19,7 +19,7 @@ from oxbow.errors import Infeasible, InvalidMission
 from oxbow.geometry.triangles import angles_rad, following, triangulated, twins_of
 from oxbow.tolerances import ROUNDING_M
 
-__all__ = ["Mesh", "Touches"]
+__all__ = ["Touches", "WaterMesh"]
 
 TOUCH_M = 1e-9
 """A place this close to a triangle touches it."""
@@ -60,7 +60,7 @@ class Touches:
 
 
 @dataclass(frozen=True)
-class Mesh:
+class WaterMesh:
     """A constrained Delaunay triangulation of water, as sides of triangles.
 
     Side s = 3 t + j of triangle t (`oxbow.geometry.triangles`) is called corner s where its tail is meant.
@@ -82,7 +82,7 @@ class Mesh:
     @classmethod
     def of(
         cls, water: Polygon | MultiPolygon, outlines: Sequence[BaseGeometry] = (), *, detail_m: float = math.inf
-    ) -> Mesh:
+    ) -> WaterMesh:
         """Triangulate water; no triangle straddles the shore or one of the outlines.
 
         Parameters

@@ -8,7 +8,7 @@ from oxbow.geometry.route.channel import Gates
 from oxbow.geometry.route.danger import NO_DANGER, Danger
 from oxbow.geometry.route.funnel import funnel_line
 from oxbow.geometry.route.incenters import incenter_line
-from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.route.mesh import WaterMesh
 from oxbow.geometry.route.network import NetworkRouter
 from oxbow.geometry.route.route import RouteMethod, Router
 from oxbow.geometry.route.tessellation import Tessellation
@@ -34,10 +34,10 @@ def make_router(method: RouteMethod, water: Polygon | MultiPolygon, danger: Dang
     InvalidMission
         The water is empty or not a valid polygon.
     """
-    return router_on(Mesh.of(water, danger.outlines), method, danger)
+    return router_on(WaterMesh.of(water, danger.outlines), method, danger)
 
 
-def router_on(mesh: Mesh, method: RouteMethod, danger: Danger) -> Router:
+def router_on(mesh: WaterMesh, method: RouteMethod, danger: Danger) -> Router:
     """The router of one method on triangulated water.
 
     Parameters

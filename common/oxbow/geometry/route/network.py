@@ -16,7 +16,7 @@ import numpy.typing as npt
 from oxbow.arrays import FloatArray, Indices
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.geometry.route.danger import Danger
-from oxbow.geometry.route.mesh import Mesh, Touches
+from oxbow.geometry.route.mesh import Touches, WaterMesh
 from oxbow.geometry.route.route import Route, RouteMethod, RouteTable, judged
 from oxbow.geometry.route.search import Arcs, Ways, cheapest_ways, distinct
 
@@ -54,7 +54,7 @@ class Network(Protocol):
     """Places in the water, joined."""
 
     @property
-    def mesh(self) -> Mesh:
+    def mesh(self) -> WaterMesh:
         """The water; zones' outlines are among its sides."""
 
     @property

@@ -18,7 +18,7 @@ from shapely import STRtree
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import FloatArray, Geometries, Indices, Mask
-from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.route.mesh import WaterMesh
 from oxbow.geometry.triangles import following, paired, triangulated, twins_of
 from oxbow.tolerances import ROUNDING_M
 
@@ -42,7 +42,7 @@ class Site(Protocol):
         """Whether places, shape (n, 2), are in the water."""
 
 
-def retriangulated(mesh: Mesh, changed: BaseGeometry, site: Site) -> Mesh:
+def retriangulated(mesh: WaterMesh, changed: BaseGeometry, site: Site) -> WaterMesh:
     """The mesh after a change.
 
     Parameters
@@ -64,7 +64,7 @@ def retriangulated(mesh: Mesh, changed: BaseGeometry, site: Site) -> Mesh:
         cavity = np.union1d(cavity, loose)
 
 
-def _hole(mesh: Mesh, cavity: Indices, changed: BaseGeometry, site: Site) -> Geometries:
+def _hole(mesh: WaterMesh, cavity: Indices, changed: BaseGeometry, site: Site) -> Geometries:
     """The water of a cavity after the change, as polygons.
 
     All lines are noded together, with the shores as they were given, not as earlier changes cut them: what
@@ -86,7 +86,7 @@ def _hole(mesh: Mesh, cavity: Indices, changed: BaseGeometry, site: Site) -> Geo
     return np.asarray(faces[inside])
 
 
-def _touched(mesh: Mesh, area: BaseGeometry) -> Indices:
+def _touched(mesh: WaterMesh, area: BaseGeometry) -> Indices:
     """The triangles that meet an area, or did before vertices on its outline were rounded."""
     low, high = np.reshape(area.bounds, (2, 2)) + np.array([[-ROUNDING_M], [ROUNDING_M]])
     # On which sides of the area's box a vertex lies, as in D. Cohen and I. Sutherland's clipping.
@@ -96,7 +96,7 @@ def _touched(mesh: Mesh, area: BaseGeometry) -> Indices:
     return np.asarray(near[shapely.dwithin(area, triangles, ROUNDING_M)])
 
 
-def _spliced(mesh: Mesh, cavity: Indices, faces: Geometries) -> tuple[_Splice, Indices]:
+def _spliced(mesh: WaterMesh, cavity: Indices, faces: Geometries) -> tuple[_Splice, Indices]:
     """The mesh with another triangulation in a cavity, and the triangles outside to which that does not fit."""
     places, fresh = triangulated(faces)
     points, number = _numbered(mesh, cavity, places)
@@ -119,7 +119,7 @@ def _spliced(mesh: Mesh, cavity: Indices, faces: Geometries) -> tuple[_Splice, I
     return _Splice(points, triangles, twins, outer), loose
 
 
-def _numbered(mesh: Mesh, cavity: Indices, places: FloatArray) -> tuple[FloatArray, Indices]:
+def _numbered(mesh: WaterMesh, cavity: Indices, places: FloatArray) -> tuple[FloatArray, Indices]:
     """All vertices, and the numbers of places among them: those that the cavity had keep theirs."""
     old = np.unique(mesh.triangles[cavity])
     # Exact comparison is safe: old and new vertices lie on one grid.
@@ -145,7 +145,7 @@ class _Splice:
     twins: Indices
     suspects: Indices
 
-    def legalised(self) -> Mesh:
+    def legalised(self) -> WaterMesh:
         """The constrained Delaunay triangulation that flips lead to; without vertices that no triangle has."""
         # A flip renumbers the sides of two triangles. A pending number may denote another side afterwards, but all
         # four sides around a flip become pending, so that none is missed.
@@ -157,7 +157,7 @@ class _Splice:
                 pending += self._flip(side, twin)
         used = np.zeros(len(self.points), dtype=np.bool_)
         used[self.triangles] = True
-        return Mesh(self.points[used], (np.cumsum(used) - 1)[self.triangles], self.twins)
+        return WaterMesh(self.points[used], (np.cumsum(used) - 1)[self.triangles], self.twins)
 
     def _is_delaunay(self, side: int, twin: int) -> bool:
         """Whether the angles opposite a side and its twin come to half a turn at most."""

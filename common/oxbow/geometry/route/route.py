@@ -14,7 +14,7 @@ from shapely import LineString
 
 from oxbow.arrays import FloatArray
 from oxbow.geometry.route.danger import Danger
-from oxbow.geometry.route.mesh import Mesh
+from oxbow.geometry.route.mesh import WaterMesh
 
 __all__ = ["Route", "RouteMethod", "RouteTable", "Router", "judged"]
 
@@ -125,7 +125,7 @@ class Router(Protocol):
         """
 
 
-def judged(polyline: FloatArray, mesh: Mesh, danger: Danger, method: RouteMethod) -> Route:
+def judged(polyline: FloatArray, mesh: WaterMesh, danger: Danger, method: RouteMethod) -> Route:
     """The route along a polyline, with its length, cost, danger and clearance.
 
     Parameters

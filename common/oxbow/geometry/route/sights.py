@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from oxbow.arrays import FloatArray, Indices, Mask
-from oxbow.geometry.route.mesh import Mesh, Touches
+from oxbow.geometry.route.mesh import Touches, WaterMesh
 from oxbow.geometry.triangles import cross, following
 
 __all__ = ["IN_LINE", "Sights", "sights"]
@@ -45,7 +45,9 @@ class _Cones:
         return _Cones(self.eye[chosen], self.side[chosen], self.right[chosen], self.left[chosen])
 
 
-def sights(mesh: Mesh, eyes: FloatArray, at: Touches, places: FloatArray, sought: Touches, wanted: Mask) -> Sights:
+def sights(
+    mesh: WaterMesh, eyes: FloatArray, at: Touches, places: FloatArray, sought: Touches, wanted: Mask
+) -> Sights:
     """What each eye sees of the corners and of some places.
 
     Parameters
@@ -89,7 +91,7 @@ def _counted(eye: Indices, corner: Indices, wanted: Mask) -> tuple[Indices, Indi
     return eye[wanted[corner]], corner[wanted[corner]]
 
 
-def _first_cones(mesh: Mesh, eyes: FloatArray, at: Touches) -> _Cones:
+def _first_cones(mesh: WaterMesh, eyes: FloatArray, at: Touches) -> _Cones:
     """From each triangle that an eye looks out of, through the sides that it does not lie on."""
     eye, side = at.sides()
     right, left = mesh.tails[side] - eyes[eye], mesh.heads[side] - eyes[eye]
@@ -97,7 +99,7 @@ def _first_cones(mesh: Mesh, eyes: FloatArray, at: Touches) -> _Cones:
     return _Cones(eye[through], mesh.twins[side[through]], right[through], left[through])
 
 
-def _parted(mesh: Mesh, cones: _Cones, apex: FloatArray) -> _Cones:
+def _parted(mesh: WaterMesh, cones: _Cones, apex: FloatArray) -> _Cones:
     """The cones beyond the triangles entered; they split at the opposite corner, `apex` as seen from the eye."""
     to_right, to_left = following(cones.side), following(following(cones.side))
     below_left, above_right = _is_left(cones.left, of=apex), _is_left(apex, of=cones.right)

@@ -22,7 +22,7 @@ from scipy.spatial import KDTree
 from oxbow.arrays import FloatArray, Indices
 from oxbow.errors import InvalidMission
 from oxbow.geometry.route.danger import NO_DANGER, Danger
-from oxbow.geometry.route.mesh import Mesh, Touches
+from oxbow.geometry.route.mesh import Touches, WaterMesh
 from oxbow.geometry.route.network import Ends, Links, Way
 from oxbow.geometry.route.search import Arcs, cheapest_ways
 from oxbow.geometry.route.sights import sights
@@ -103,7 +103,7 @@ class Tessellation:
         `side_m` is not a length, or less than a thousandth of the longer side of the water's box.
     """
 
-    def __init__(self, mesh: Mesh, danger: Danger = NO_DANGER, *, side_m: float | None = None) -> None:
+    def __init__(self, mesh: WaterMesh, danger: Danger = NO_DANGER, *, side_m: float | None = None) -> None:
         across_m = float(np.ptp(mesh.points, axis=0).max())
         least_m = across_m / MOST_SIDES_ACROSS
         if side_m is not None and not least_m <= side_m < math.inf:

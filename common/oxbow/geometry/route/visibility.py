@@ -17,7 +17,7 @@ import numpy as np
 
 from oxbow.arrays import FloatArray, Indices, Mask
 from oxbow.geometry.route.danger import NO_DANGER, Danger
-from oxbow.geometry.route.mesh import Mesh, Touches
+from oxbow.geometry.route.mesh import Touches, WaterMesh
 from oxbow.geometry.route.network import Ends, Links
 from oxbow.geometry.route.search import Arcs, distinct
 from oxbow.geometry.route.sights import IN_LINE, sights
@@ -48,7 +48,7 @@ class VisibilityGraph:
         The danger zones, as they count for one vehicle.
     """
 
-    mesh: Mesh
+    mesh: WaterMesh
     danger: Danger = NO_DANGER
 
     @cached_property
@@ -114,7 +114,7 @@ class Bends:
     after: FloatArray
 
     @classmethod
-    def of(cls, mesh: Mesh, *, any_turn: bool) -> Bends:
+    def of(cls, mesh: WaterMesh, *, any_turn: bool) -> Bends:
         """The bends of a mesh: its corners of half a turn or more.
 
         Parameters
