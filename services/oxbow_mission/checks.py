@@ -79,7 +79,7 @@ class Checks(Closing):
             lane.drop(client)
 
     def close(self) -> None:
-        """Check no more."""
+        """Stop checking, and end the helper processes."""
         self._quick.close()
         self._slow.close()
 

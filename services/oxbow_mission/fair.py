@@ -156,7 +156,7 @@ class FairQueue(Generic[T]):
             return [item for item, _ in self._rows.pop(client, _Row()).items]
 
     def close(self) -> None:
-        """Give out no more."""
+        """Give out nothing more: every `get` returns None from now on."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()

@@ -13,7 +13,7 @@ __all__ = ["Handler", "HungUp", "Peer"]
 
 
 class HungUp(BaseException):
-    """The mission service is gone, or wants no more of this process: no handler is to deal with it."""
+    """The mission service is gone, or has closed the pipe. No Exception: no handler may catch it by chance."""
 
 
 class Peer:

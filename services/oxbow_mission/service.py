@@ -38,7 +38,7 @@ MOST_QUEUED = 256
 MOST_UNREAD = 1024
 """Puts that may wait to be read."""
 LOOK_S = 0.5
-"""How often it is looked which clients are gone, whose time is up, and whether the store is still there."""
+"""How often the service checks which clients are gone, whose time is up, and whether the store is still there."""
 
 _log = logging.getLogger(__name__)
 
@@ -86,6 +86,7 @@ class MissionService(Closing):
         bus.answer(history, self._history, workers=2, queue_size=MOST_QUEUED)
         self._keeper = threading.Thread(target=self._keep_house, name="keeper", daemon=True)
         self._keeper.start()
+        # Last of all: whoever sees the token asks at once.
         bus.declare_live(live_key("mission", instance))
 
     def close(self) -> None:
@@ -170,6 +171,7 @@ class MissionService(Closing):
         while not self._over.wait(LOOK_S):
             try:
                 alive = set(self.bus.instances("client"))
+                # Only clients that were seen can go: a name without a token, or none, is never dropped.
                 for client in present - alive:
                     self.checks.drop(client)
                 if let_go := self.waiters.let_go(present - alive):

@@ -50,7 +50,7 @@ class Checked(msgspec.Struct, frozen=True, kw_only=True, tag=True):
 
 
 class Plan(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """Plan a revision of a mission; layers are of use to someone where `show` is set."""
+    """Plan a revision of a mission; layers are wanted where `show` is set."""
 
     mission_id: str
     revision: int

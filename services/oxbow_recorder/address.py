@@ -66,7 +66,7 @@ def address_of(key: str, payload: bytes) -> Address:
         raise InvalidMission(f"is {len(payload)} bytes; expected at most {MOST_LAYER_BYTES}", where="layer")
     try:
         stamp = msgspec.msgpack.decode(payload, type=_Stamp)
-    except (ValueError, RecursionError) as error:  # of DecodeError, UnicodeDecodeError is no kind
+    except (ValueError, RecursionError) as error:  # UnicodeDecodeError is a ValueError, but no DecodeError
         raise InvalidMission(f"is no layer: {error}", where="layer") from error
     run = Run(mission_id=stamp.mission_id, run_id=stamp.request_id or "run")
     own_key = layer_key(stamp.mission_id, stamp.layer.stage, stamp.layer.name)

@@ -44,7 +44,7 @@ class LiveServer(Closing):
             self.process = self._launch()
 
     def close(self) -> None:
-        """Serve no more."""
+        """End the server."""
         self.process.terminate()
         try:
             self.process.wait(END_S)
@@ -60,6 +60,7 @@ class LiveServer(Closing):
 
 def _is_free(port: int) -> bool:
     with socket.socket() as probe:
+        # As servers do: a port on which old connections are only timing out counts as free.
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind(("127.0.0.1", port))

@@ -275,7 +275,7 @@ class Runs(Closing):
         return writer.is_ending or writer.has_died() or writer.begun >= MOST_BEGUN
 
     def _let_go_of_runs(self) -> None:
-        """Let go of runs from which nothing comes any more, and of those that were lost with their process."""
+        """Finish runs from which nothing comes any more, and forget those that were lost with their process."""
         now = self._clock()
         idle_s = IDLE_S if len(self._writers) < MOST_WRITERS else RECENT_S
         for recorded in tuple(self._open.values()):

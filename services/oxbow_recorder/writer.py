@@ -148,6 +148,7 @@ class Writer:
                 self.pid = self._process.pid
             while (order := self._orders.get()) is not None:
                 self._send(ours, order)
+        # The pipe is closed: the process finishes its files, and ends.
         try:
             status = self._process.wait(END_S)
         except subprocess.TimeoutExpired as error:
@@ -168,7 +169,7 @@ class Writer:
         self._busy_since = time.monotonic()
         try:
             pipe.send_bytes(order)
-            pipe.recv_bytes()
+            pipe.recv_bytes()  # one order at a time: what waits is counted, rather than hidden in a pipe
         except EOFError as error:
             raise OSError("its process died") from error
         finally:

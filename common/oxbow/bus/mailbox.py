@@ -55,7 +55,7 @@ class Mailbox(Generic[T]):
         return self._items.qsize()
 
     def close(self) -> None:
-        """Take no more, deliver what waits, and end the threads."""
+        """Accept nothing more, deliver what waits, and end the threads."""
         if self._closed.is_set():
             return
         self._closed.set()

@@ -40,7 +40,7 @@ from oxbow.wire.waits import checked_wait
 __all__ = ["MOST_KEY_BYTES", "Session", "error_of", "is_timeout", "told_error"]
 
 MOST_KEY_BYTES = 4096
-"""An id of 128 characters, percent-encoded and with all that stands around it, is far shorter."""
+"""The key of an id of 128 characters, percent-encoded, is far shorter."""
 
 OPEN_ATTEMPT_S = 1.0
 LINK_LOSS_S = 0.1
@@ -352,7 +352,7 @@ class Session(Closing):
         self._tokens[key] = self._session.liveliness().declare_token(key)
 
     def undeclare_live(self, key: str) -> None:
-        """Be seen no more."""
+        """Withdraw the token of `declare_live`."""
         self._tokens.pop(key).undeclare()
 
     def _watch_liveness(self, key_expr: str, on_change: Callable[[str, bool], None]) -> None:
@@ -401,6 +401,7 @@ class Session(Closing):
         if event.kind == zenoh.SampleKind.PUT:
             self.links += 1
         if event.kind == zenoh.SampleKind.DELETE:
+            # On another thread: this one is zenoh's, and must not wait.
             give_up = threading.Timer(LINK_LOSS_S, self._give_up_asking)
             give_up.daemon = True
             give_up.start()

@@ -275,6 +275,7 @@ class Client(Closing):
         give_up = time.monotonic() + timeout_s
         while True:
             try:
+                # Never 0: the last attempt, too, has time for an answer.
                 return ask(max(RETRY_PAUSE_S, give_up - time.monotonic()))
             except (Busy, Unavailable):
                 if time.monotonic() + RETRY_PAUSE_S > give_up:

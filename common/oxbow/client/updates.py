@@ -196,6 +196,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
     # ----------------------------------------------------------------- catching up
 
     def _is_due(self) -> bool:
+        # While the link was down, nothing published was heard: ask at once.
         if self._links != self._bus.links:
             self._links, self._due_s = self._bus.links, 0.0
         return time.monotonic() >= self._due_s
@@ -205,7 +206,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
         while True:
             try:
                 self._catch_up()
-            except Unavailable:
+            except Unavailable:  # the service may just be starting again
                 if time.monotonic() > give_up:
                     raise
                 time.sleep(LOOK_S)

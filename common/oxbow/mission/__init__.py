@@ -1,1 +1,1 @@
-"""The Mission File: what stands in it, and how it is read and written."""
+"""The Mission File: its fields, and how it is read and written."""

@@ -120,7 +120,7 @@ _PARTS: dict[str, tuple[type[msgspec.Struct], bool]] = {
     "Vehicles": (GivenVehicle, True),
     "DangerZones": (GivenDangerZone, True),
 }
-"""Parts of the file that may have fields unknown here, and whether the part is a list of such objects."""
+"""Parts of the file that may have unknown fields, and whether the part is a list of such objects."""
 
 
 class OutlineName(enum.StrEnum):
@@ -271,11 +271,12 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
 
 
 FIELD_NAMES = frozenset(_JSON_NAMES.values()) | {name.value for name in OutlineName}
-"""Every field of the Mission File that has a meaning here."""
+"""Every known field of the Mission File."""
 
 
 def _require_degrees(name: str, positions: Sequence[Position], *, indexed: bool = True) -> None:
     degrees = lonlat(positions)
+    # What is right is asked for, not what is wrong: every comparison with NaN is false.
     wrong = ~((np.abs(degrees[:, 1]) <= 90.0) & (np.abs(degrees[:, 0]) <= 360.0))
     if not wrong.any():
         return
@@ -340,6 +341,7 @@ def mission_json(mission: Mission) -> bytes:
     if mission.danger_zones is not None:
         given["DangerZones"] = [document_of(zone) for zone in mission.danger_zones]
     document = given | {mission.outline_name.value: outline} | mission.extra | outputs
+    # What is absent is left out; an unknown field that was null stays so.
     present = {name: value for name, value in document.items() if value is not None or name in mission.extra}
     return msgspec.json.format(msgspec.json.encode(present), indent=2) + b"\n"
 

@@ -106,7 +106,7 @@ class TreatedSpot(Message, frozen=True, kw_only=True):
 
 
 class FurtherSortie(Message, frozen=True, kw_only=True):
-    """A journey that is proposed for what the first ones leave: by the same vehicle, from its start once more."""
+    """A sortie proposed for hot spots that the first ones leave: by the same vehicle, from its start again."""
 
     vehicle: str
     hot_spots: tuple[str, ...]
@@ -129,7 +129,7 @@ class PlanRecord(Message, frozen=True, kw_only=True):
     """The `Plan` object of a completed Mission File: how the paths were made and how good they are.
 
     It is about the masters' paths, or the slaves' where there is no master; of several paths, lengths are sums,
-    `duration_s` is the longest, `spacing_m` the widest, and `heading_deg` is there where they have it in common.
+    `duration_s` is the longest, `spacing_m` the widest, and `heading_deg` is set where all have the same.
     `fleet` describes each vehicle, unless one surveys alone, and `treatment` the hot spots; `slave_certificate` is
     that of the slaves' paths where there are masters too.
 

@@ -226,6 +226,7 @@ class Harbour:
         self.space = space
         self._shore = leg_routes(space.free, space.water)
         inner = Routes(space.free)
+        # From wide to narrow; the router of each is made only when it is asked.
         self._lanes = [
             _Lanes(space, self._shore, inner, APART * spacing_m * 0.5**step) for step in range(HALVINGS)
         ]
@@ -389,7 +390,7 @@ def _to_one_gate(out: _Way, home: _Way, recovery: Place) -> _Way:
 def _edge_middles(area: BaseGeometry, most: int) -> FloatArray:
     """Places (n, 2) in the middle of an area's longest edges: a path may begin, end and run along them."""
     xy, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(area)), return_index=True)
-    # The last point of one ring and the first of the next are neighbours here, but no edge.
+    # The last point of one ring and the first of the next are neighbours in this array, but no edge.
     edges = np.stack([xy[:-1], xy[1:]], axis=1)[ring[:-1] == ring[1:]]
     # Stable, so that edges of one length are tried in the same order on every machine.
     longest = np.argsort(-np.hypot(*(edges[:, 1] - edges[:, 0]).T), kind="stable")[:most]

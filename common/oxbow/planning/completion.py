@@ -131,6 +131,7 @@ def _figures(mission: Mission, written: Sequence[_Written]) -> dict[str, Any]:
     """What the record says of one team as a whole."""
     headings = {each.plan.heading_rad for each in written}
     heading_rad = headings.pop() if len(headings) == 1 else None
+    # A treatment has no spacing: its passes are a swath apart.
     spacings_m = [each.plan.spacing_m or mission.treated_swath_m or 0.0 for each in written]
     return {
         "heading_deg": None if heading_rad is None else math.degrees(heading_rad),
@@ -167,6 +168,7 @@ def _team_warnings(mission: Mission, options: PlanOptions, team: TeamPlan) -> tu
 
 def _unsafe_legs(mission: Mission, team: TeamPlan) -> Iterator[str]:
     """Warnings about legs that launch and recovery points make necessary: over land, or far within Safety."""
+    # The certificate of a single path has no tracks: it is itself that of the path.
     tracks = team.certificate.tracks or (team.certificate,)
     for plan, track in zip(team.vehicles, tracks, strict=True):
         vehicle = plan.member.vehicle

@@ -101,6 +101,7 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
         shore_tolerance_m=mission.shore_tolerance_m,
         least_width_m=mission.least_width_m,
     )
+    # Stages know places by number only: their errors are given the names of the author's fields.
     fields = {f"places[{index}]": field for index, field in enumerate(site.ends)}
     with renamed(fields | {"least_width_m": "Least_width"}):
         space = call(CONTOUR, contour)

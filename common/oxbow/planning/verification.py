@@ -1,7 +1,7 @@
 """The replies of stages, checked against their requests before they are used.
 
 A stage may be an old replica, a wrong one, or one that mixes its answers up. What it replies has to belong to the
-request; and a path leaves only after it has been judged once more here, on the mission's own water.
+request; and a path leaves only after it has been judged once more, on the mission's own water.
 """
 
 from __future__ import annotations

@@ -204,7 +204,7 @@ class _Zones:
     outline_name: str
 
     def within(self, outline: Polygon, frame: Frame) -> list[Zone]:
-        """What each stands for on the water of an outline.
+        """The zone that each contour makes on the water of an outline.
 
         Raises
         ------

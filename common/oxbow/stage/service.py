@@ -89,7 +89,7 @@ class Stage:
         _log.info("%s serves %s", self.described.instance_key, worker.handler)
 
     def drain(self) -> None:
-        """Be chosen no more, and answer what has been accepted."""
+        """Withdraw from the bus, and answer what has been accepted."""
         self.session.undeclare_live(self.described.live_key)
         self._requests.close()
         # Until this, whoever still asks is answered `busy`, and so asks another replica at once.
@@ -146,6 +146,7 @@ class Stage:
             answer = self._fault(exchange, described(error))
         finally:
             self._settle(exchange, answer, time.monotonic() - started)
+        # Now, so that the next request need not wait for a new process.
         with suppress(Unavailable):
             self._require_worker()
 
@@ -154,7 +155,7 @@ class Stage:
         return Failed(request_id=exchange.envelope.request_id, error=ErrorReply.of(error))
 
     def _settle(self, exchange: _Exchange, answer: Done | Failed, seconds: float) -> None:
-        """Let go of a request, and answer all who wait for it."""
+        """Close a request, and answer all who wait for it."""
         with self._lock:
             del self._open[exchange.envelope.request_id]
             self._served += 1
@@ -165,7 +166,7 @@ class Stage:
             self._reply(query, answer)
 
     def _answer(self, exchange: _Exchange) -> Done | Failed:
-        """Have the worker answer; what is raised here says nothing of the request, which may be asked again."""
+        """Have the worker answer; an error raised by this is not about the request, which may be asked again."""
         envelope = exchange.envelope
         if envelope.remaining_s() <= 0:
             raise DeadlineExceeded("not started: the deadline passed in the queue", where=self.described.stage)

@@ -29,8 +29,8 @@ class Verdict(enum.Enum):
 class Watch:
     """Kills a process that is past a deadline or frozen, while someone reads from its pipe or writes to it.
 
-    Whoever does finds the pipe closed then: neither a message that never comes, nor one that breaks off half way,
-    nor a pipe that is full can hold them. A context manager.
+    The reader or writer then finds the pipe closed: it is held up neither by a message that never comes or breaks
+    off half way, nor by a pipe that is full. A context manager.
 
     Parameters
     ----------

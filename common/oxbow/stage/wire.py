@@ -13,11 +13,11 @@ from oxbow.wire.envelope import Envelope
 __all__ = ["MOST_MESSAGE_BYTES", "Described", "Done", "Failed", "FromWorker", "Job", "Shown"]
 
 MOST_MESSAGE_BYTES = 2**28
-"""More than any message takes: the largest reply, and what stands around it."""
+"""More than any message takes: the largest reply, with its ids."""
 
 
 class Job(msgspec.Struct, frozen=True, kw_only=True):
-    """A request for the worker; layers are of use to someone where `show` is set."""
+    """A request for the worker; layers are wanted where `show` is set."""
 
     envelope: Envelope
     payload: bytes

@@ -143,7 +143,7 @@ class Worker:
 
     def close(self) -> None:
         """End the process: at once where it is idle."""
-        self._pipe.close()
+        self._pipe.close()  # an idle process reads the end of the pipe, and ends
         try:
             self._process.wait(END_S)
         except subprocess.TimeoutExpired:
