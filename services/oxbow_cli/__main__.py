@@ -12,7 +12,7 @@ __all__ = ["main"]
 
 def main() -> None:
     """Run the command; ends the process with its exit status."""
-    ending.begin()  # before all that takes time, imports too
+    ending.begin()  # before anything that takes time, imports included
     tolerate_any_text()
     from oxbow_cli.app import app  # noqa: PLC0415 - as above
     from oxbow_cli.exits import exit_status, explain  # noqa: PLC0415
@@ -20,7 +20,7 @@ def main() -> None:
     try:
         app(prog_name="oxbow")
     except Exception as error:  # noqa: BLE001 - the outermost frame: no traceback but with --debug
-        if ending.status is not None:  # what was unwound may have raised something of its own
+        if ending.status is not None:  # unwinding may have raised an error of its own
             sys.exit(ending.status)
         explain(error)
         sys.exit(exit_status(error))

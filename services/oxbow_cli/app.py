@@ -1,7 +1,7 @@
 """The commands, their options and their help.
 
-Each command imports what it works with when it runs, so that `--help`, and a client of a stack that is up, do
-not pay for algorithms.
+Each command imports what it needs when it runs, so that `--help`, and a client of a running stack, do not pay for
+importing the algorithms.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ MissionFile = Annotated[Path, typer.Argument(metavar="FILE", help="The Mission F
 Home = Annotated[
     Path | None,
     typer.Option(
-        envvar="OXBOW_HOME", help="Where missions and recordings are kept; else the user's state folder."
+        envvar="OXBOW_HOME", help="Where missions and recordings are kept; by default the user's state folder."
     ),
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON in place of a table.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 
 
 def _print_version(wanted: bool) -> None:
@@ -69,7 +69,7 @@ def plan(
     prior: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Where sampling matters more: GeoJSON or a raster, in place of FILE's PriorModel."
+            metavar="FILE", help="Where sampling matters more: GeoJSON or a raster, instead of FILE's PriorModel."
         ),
     ] = None,
     connect: Annotated[
@@ -77,22 +77,27 @@ def plan(
     ] = None,
     local: Annotated[bool, typer.Option("--local", help="Plan in this process, without a bus.")] = False,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="The completed Mission File, in place of FILE itself.")
+        Path | None,
+        typer.Option("--output", "-o", help="Where to write the completed Mission File, instead of FILE itself."),
     ] = None,
     record: Annotated[
-        Path | None, typer.Option(metavar="FILE.rrd", help="The recording, in place of one under --home.")
+        Path | None,
+        typer.Option(metavar="FILE.rrd", help="Where to write the recording, instead of under --home."),
     ] = None,
     heading: Annotated[
-        float | None, typer.Option(metavar="DEG", help="Of the transects, clockwise from north; else the best.")
+        float | None,
+        typer.Option(
+            metavar="DEG", help="Heading of the transects, clockwise from north; by default the best one."
+        ),
     ] = None,
     seed: Annotated[
-        int, typer.Option(min=0, help="Of all that is random; the same seed gives the same plan.")
+        int, typer.Option(min=0, help="Seed of everything random; the same seed gives the same plan.")
     ] = 0,
     time_limit: Annotated[
         float | None,
         typer.Option(
             metavar="S",
-            help="Improve the path for so many seconds at most, in place of a fixed amount of work.",
+            help="Improve the path for at most this many seconds, instead of a fixed amount of work.",
         ),
     ] = None,
     smooth: Annotated[bool, typer.Option("--smooth", help="Round the path's corners.")] = False,
@@ -100,7 +105,7 @@ def plan(
         str, typer.Option(help="How SpaceFillingCurve draws its inputs: low-discrepancy or convex-combination.")
     ] = "low-discrepancy",
     timeout: Annotated[
-        float, typer.Option(metavar="S", help="Give up after so many seconds, a day at most.")
+        float, typer.Option(metavar="S", help="Give up after this many seconds; at most a day.")
     ] = 300.0,
     home: Home = None,
     json: AsJson = False,
@@ -108,8 +113,8 @@ def plan(
     """Plan the path of a Mission File, and complete the file.
 
     Without `--connect` or `--local`, a router and the services are started for this one plan, as separate
-    processes on a free port, and stopped again. The file is replaced in one step; on any failure it stays
-    as it was.
+    processes on a free port, and then stopped. The file is replaced in one step; on any failure it stays as it
+    was.
 
     Examples:
 
@@ -161,15 +166,15 @@ def plan(
 def up(
     listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where the router listens.")] = DEFAULT_ENDPOINT,
     replicas: Annotated[
-        list[str] | None, typer.Option(metavar="STAGE=N", help="Processes of a stage; may be repeated.")
+        list[str] | None, typer.Option(metavar="STAGE=N", help="Number of processes of a stage; may be repeated.")
     ] = None,
     home: Home = None,
 ) -> None:
     """Start a router and the services, and keep them running until Ctrl-C or SIGTERM.
 
-    There is one process of each stage, and of the path stage one per processor, two at least: a mission that takes
-    long does not hold up all others. A process that dies is started again. Plan on the stack with
-    `oxbow plan --connect`, or with `oxbow.Client` from Python.
+    Each stage has one process; the path stage has one per processor, but at least two, so that a long mission does
+    not hold up all others. A process that dies is restarted. Plan on the stack with `oxbow plan --connect`,
+    or with `oxbow.Client` from Python.
 
     Example: `oxbow up --listen tcp/127.0.0.1:7447 --replicas path=4`
     """
@@ -200,7 +205,7 @@ def status(
     connect: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where the router listens.")] = DEFAULT_ENDPOINT,
     json: AsJson = False,
 ) -> None:
-    """Show what runs on a stack, and where its missions stand.
+    """Show the processes of a stack and the state of its missions.
 
     Example: `oxbow status --connect tcp/127.0.0.1:7447`
     """
@@ -219,14 +224,14 @@ def status(
 def evaluate(
     file: Annotated[Path | None, typer.Argument(metavar="FILE", help="The Mission File.")] = None,
     compare: Annotated[
-        tuple[Path, Path] | None, typer.Option(metavar="A B", help="Two Mission Files, side by side.")
+        tuple[Path, Path] | None, typer.Option(metavar="A B", help="Compare two Mission Files side by side.")
     ] = None,
     json: AsJson = False,
 ) -> None:
-    """Judge the path in a completed Mission File, whoever made it; or compare two.
+    """Judge the path in a completed Mission File, whoever made it, or compare two.
 
-    Measures how well the path covers the water, with certified bounds, and whether it keeps to it. A comparison
-    marks the better figure of each measure, and says where the two missions are not the same.
+    Measures how well the path covers the water, with certified bounds, and whether it keeps the rules. A
+    comparison marks the better value of each measure, and reports where the two missions differ.
 
     Examples:
 
@@ -262,14 +267,22 @@ def evaluate(
 @app.command(name="import")
 def import_site(
     site: Annotated[Path, typer.Argument(metavar="SITE.geojson", help="A polygon in WGS84 degrees.")],
-    launch: Annotated[str, typer.Option(metavar="LAT,LONG", help="Where the vehicle is put in.")],
-    recovery: Annotated[str | None, typer.Option(metavar="LAT,LONG", help="Where it is taken out.")] = None,
-    safety: Annotated[float, typer.Option(help="Least distance from the shore and the zones, m.")] = 0.0,
-    length: Annotated[float, typer.Option(help="Greatest length of the path, m.")] = 20_000.0,
-    spacing: Annotated[float | None, typer.Option(help="Least distance between parallel segments, m.")] = None,
-    name: Annotated[str | None, typer.Option(help="The site's name; else the feature's own.")] = None,
-    part: Annotated[int | None, typer.Option(help="Which polygon, where there are several; from 0.")] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="In place of stdout.")] = None,
+    launch: Annotated[str, typer.Option(metavar="LAT,LONG", help="Where the vehicle is launched.")],
+    recovery: Annotated[
+        str | None, typer.Option(metavar="LAT,LONG", help="Where it is recovered; by default the launch point.")
+    ] = None,
+    safety: Annotated[float, typer.Option(help="Least distance from the shore and the zones, in metres.")] = 0.0,
+    length: Annotated[float, typer.Option(help="Greatest length of the path, in metres.")] = 20_000.0,
+    spacing: Annotated[
+        float | None, typer.Option(help="Least distance between parallel segments, in metres.")
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="The site's name; by default the feature's own.")] = None,
+    part: Annotated[
+        int | None, typer.Option(help="Which polygon to use if there are several, counted from 0.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The file to write, instead of stdout.")
+    ] = None,
 ) -> None:
     """Make a Mission File from GeoJSON: the exterior is the outline, holes are forbidden zones.
 
@@ -333,7 +346,7 @@ def picture(
 
 @app.command()
 def inspect(
-    mission: Annotated[str, typer.Argument(metavar="ID", help="A mission's id, or the path of a recording.")],
+    mission: Annotated[str, typer.Argument(metavar="ID", help="A mission's ID, or the path of a recording.")],
     home: Home = None,
 ) -> None:
     """Open the recording of a mission, stage by stage, in the rerun viewer.

@@ -1,4 +1,4 @@
-"""What the command line gives, as what the library takes."""
+"""Arguments of the command line, converted to what the library takes."""
 
 from __future__ import annotations
 
@@ -35,17 +35,43 @@ __all__ = [
 
 
 LEAST_S = 0.001
-"""Of a time limit: an alarm can be set for no less."""
+"""The least time limit: a shorter alarm could round to none at all."""
 
 
 def endpoint(text: str, where: str) -> str:
-    """Where a router listens, as ``tcp/HOST:PORT``."""
+    """The address where a router listens, checked.
+
+    Parameters
+    ----------
+    text
+        Expected as ``tcp/HOST:PORT``.
+    where
+        The option that gave it, for errors.
+
+    Returns
+    -------
+    str
+        The text itself.
+    """
     require_endpoint(text, where)
     return text
 
 
 def position(text: str, where: str) -> Position:
-    """A position written ``LAT,LONG`` in degrees."""
+    """A position written ``LAT,LONG`` in degrees.
+
+    Parameters
+    ----------
+    text
+        What was written.
+    where
+        The option that gave it, for errors.
+
+    Raises
+    ------
+    InvalidMission
+        The text is not two numbers.
+    """
     try:
         lat, long = map(float, text.split(","))
     except ValueError as error:
@@ -56,7 +82,28 @@ def position(text: str, where: str) -> Position:
 def plan_options(
     method: str, *, seed: int, heading_deg: float | None, time_limit_s: float | None, smooth: bool, draw: str
 ) -> PlanOptions:
-    """How to plan."""
+    """The options of a plan.
+
+    Parameters
+    ----------
+    method
+        The name of a `Method`.
+    seed
+        Seed of everything random.
+    heading_deg
+        Of transects, in degrees clockwise from north; None for the best one.
+    time_limit_s
+        How long to improve the path, in seconds; None for a fixed amount of work.
+    smooth
+        Whether corners are rounded.
+    draw
+        The name of a `Draw`.
+
+    Raises
+    ------
+    InvalidMission
+        A name is unknown, or the heading is not finite; names the option.
+    """
     if heading_deg is not None and not math.isfinite(heading_deg):
         raise InvalidMission(f"is {heading_deg!r}; expected degrees clockwise from north", where="--heading")
     return PlanOptions(
@@ -76,14 +123,32 @@ def _one_of(names: type[E], text: str, where: str) -> E:
 
 
 def with_prior(mission: Mission, prior: Path | None) -> Mission:
-    """The mission with the prior model of a file in place of its own, where there is such a file."""
+    """The mission with the prior model of a file instead of its own.
+
+    Parameters
+    ----------
+    mission
+        The mission.
+    prior
+        GeoJSON or a raster; None leaves the mission as it is.
+    """
     return mission if prior is None else msgspec.structs.replace(mission, prior_model=read_prior(prior))
 
 
 def replica_counts(texts: Iterable[str]) -> dict[str, int]:
-    """How many processes of each stage, each written ``STAGE=N``.
+    """The number of processes of each stage that is not to have a single one.
 
-    Of the path stage, by default, one per processor and two at least: a mission that takes long holds up no other.
+    By default, the path stage has one per processor and at least two, so that a long mission holds up no other.
+
+    Parameters
+    ----------
+    texts
+        Each written ``STAGE=N``; of several for one stage, the last counts.
+
+    Raises
+    ------
+    InvalidMission
+        A text has another form.
     """
     counts = {"path": max(2, os.cpu_count() or 1)}
     for text in texts:
@@ -97,7 +162,20 @@ def replica_counts(texts: Iterable[str]) -> dict[str, int]:
 def require_compatible(
     *, local: bool, connect: str | None, record: Path | None, time_limit_s: float | None, timeout_s: float
 ) -> None:
-    """Refuse options that contradict one another, or ask for a time that is none."""
+    """Refuse options that contradict one another, and times that are out of bounds.
+
+    Parameters
+    ----------
+    local, connect, record
+        Options of `oxbow plan`.
+    time_limit_s, timeout_s
+        The same, in seconds, `LEAST_S` to `MOST_DEADLINE_S`; the time limit is to be less than the timeout.
+
+    Raises
+    ------
+    InvalidMission
+        Names the option.
+    """
     _require_seconds("--timeout", timeout_s)
     if time_limit_s is not None:
         _require_seconds("--time-limit", time_limit_s)
@@ -122,14 +200,14 @@ def _require_seconds(where: str, value: float) -> None:
 
 
 def read(path: Path) -> Mission:
-    """The mission in a file; an error about the file as a whole has its name."""
+    """The mission in a file; an error about the file as a whole is reported under the file's name."""
     with renamed({"Mission File": str(path)}):
         return read_mission(path)
 
 
 @contextmanager
 def naming(file: str) -> Iterator[None]:
-    """Name the file of which an error tells, where a command takes several."""
+    """Add the name of the file to errors about it, for a command that takes several."""
     try:
         yield
     except OxbowError as error:

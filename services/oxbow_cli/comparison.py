@@ -1,4 +1,4 @@
-"""Two completed Mission Files side by side: which of them is better at what."""
+"""Two completed Mission Files side by side: by which measures each is better."""
 
 from __future__ import annotations
 
@@ -43,19 +43,19 @@ OF_ANY_MISSION = frozenset(
     {"is_simple", "crossings", "outside_m", "unsafe_m", "starts_at_launch_m", "ends_at_recovery_m", "judged_area"}
     | {"q", "mean_ratio", "p95_ratio", "p99_ratio", "discrepancy_ratio", "directional_evenness"}
 )
-"""Measures that paths of different missions can be compared by: rules, and shares of what is possible there."""
+"""Measures that compare paths of different missions: rules, and ratios to what is possible in each."""
 
 EQUAL = 0.01
-"""Figures that differ by no more than this share are equal: bounds of the cover radius are as far apart."""
+"""Values that differ by no more than this fraction are equal: bounds of the cover radius are as far apart."""
 
 EQUAL_M = 0.01
-"""Metres that do not matter: the rounding of degrees in a file."""
+"""Metres that do not matter: about the rounding of degrees in a file."""
 
 
 class Comparison(Message, frozen=True, kw_only=True):
-    """Two evaluations, the measures that each is better at, the rules that each breaks, how the missions differ.
+    """Two evaluations: by which measures each is better, which rules each breaks, and how the missions differ.
 
-    Where the missions differ, only measures that do not depend on the mission are compared.
+    If the missions differ, only measures that do not depend on the mission are compared.
     """
 
     first: Evaluation
@@ -68,7 +68,14 @@ class Comparison(Message, frozen=True, kw_only=True):
 
 
 def compare(first: Mission, second: Mission, *, names: tuple[str, str] = ("first", "second")) -> Comparison:
-    """Evaluate two missions' paths, and tell which is better at what; errors have the name of the mission.
+    """Evaluate the paths of two missions, and find by which measures each is better.
+
+    Parameters
+    ----------
+    first, second
+        Completed missions.
+    names
+        How errors call the two.
 
     Raises
     ------
@@ -95,7 +102,7 @@ def compare(first: Mission, second: Mission, *, names: tuple[str, str] = ("first
 
 
 def _differences(first: Mission, second: Mission) -> Iterator[str]:
-    """How two missions differ in what a path is judged by."""
+    """How two missions differ in what matters to the judgement of a path."""
     here, there = Site.of(first), Site.of(second)
     if (here.frame, here.outline) != (there.frame, there.outline):
         areas_km2 = here.outline.area / 1e6, there.outline.area / 1e6
@@ -138,7 +145,7 @@ def _is_better(name: str, one: Evaluation, other: Evaluation) -> bool:
 
 
 def _figure(value: Any) -> float | None:
-    """What is compared of a measure: of bounds, the upper one."""
+    """The number by which a measure is compared; of bounds, the upper one."""
     if isinstance(value, tuple):
         return float(value[-1])
     return None if value is None else float(value)

@@ -1,4 +1,4 @@
-"""Where a command writes: checked before the work begins, and kept from harm when it is done."""
+"""Where a command writes: checked before the work begins, and replaced safely when it is done."""
 
 from __future__ import annotations
 
@@ -21,25 +21,27 @@ __all__ = ["Destination", "writing"]
 
 @dataclass(frozen=True)
 class Destination:
-    """A file to write, and a digest of what stood there before; None where there was none."""
+    """A file to write, and a digest of its former content; None if there was no such file."""
 
     path: Path
     digest: bytes | None
 
     @classmethod
     def of(cls, path: Path, *, inputs: Iterable[Path | None] = ()) -> Destination:
-        """A file that can be written, as far as can be told beforehand.
+        """A file that can be written, as far as this can be known in advance.
 
         Parameters
         ----------
+        path
+            The file.
         inputs
-            Files that the command reads or writes besides, and that must not be overwritten.
+            Other files that the command reads or writes, and that must not be overwritten; None is skipped.
 
         Raises
         ------
         InvalidMission
-            It is a folder, no regular file, write-protected or one of the `inputs`, or its folder is missing or
-            cannot be written to.
+            It is a folder or not a regular file, is write-protected or one of the `inputs`, or its folder is
+            missing or not writable.
         """
         with writing(path):
             for other in inputs:
@@ -52,17 +54,23 @@ class Destination:
             return cls(path, _digest(path))
 
     def write(self, data: bytes) -> None:
-        """Replace the file as a whole, or leave it as it was."""
-        with writing(self.path), ending.held():
-            write_atomically(self.path, data)
-
-    def keep(self, data: bytes) -> None:
-        """Write what must not be lost; where that would undo another's change, or fails, beside the file.
+        """Replace the file as a whole, or leave it as it was.
 
         Raises
         ------
         InvalidMission
-            It is kept elsewhere; the error tells why, and where.
+            It cannot be written.
+        """
+        with writing(self.path), ending.held():
+            write_atomically(self.path, data)
+
+    def keep(self, data: bytes) -> None:
+        """Write what must not be lost; if that fails or would undo another's change, write it beside the file.
+
+        Raises
+        ------
+        InvalidMission
+            The data is kept elsewhere; the error says why, and where.
         """
         with ending.held():
             self._keep(data)
@@ -72,23 +80,23 @@ class Destination:
             if _digest(self.path) == self.digest:
                 write_atomically(self.path, data)
                 return
-            problem = "was changed meanwhile, and is left as it is"
+            problem = "was changed in the meantime, and is left as it is"
         except OSError as error:
             problem = f"cannot be written: {error.strerror or error}"
         kept = _kept_elsewhere(self.path, data)
-        where = "could be kept nowhere" if kept is None else f"is kept in {str(kept)!r}"
+        where = "could not be kept anywhere" if kept is None else f"is kept in {str(kept)!r}"
         raise InvalidMission(f"{problem}; the plan {where}", where=str(self.path))
 
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Report a file that cannot be written as a fault of what was asked."""
+    """Report a file that cannot be written as invalid input."""
     try:
         yield
     except OSError as error:
         raise InvalidMission(f"cannot be written: {error.strerror or error}", where=str(path)) from error
-    except RuntimeError as error:  # as `Path.resolve` has it
-        raise InvalidMission("cannot be written: its symbolic links go round in a circle", str(path)) from error
+    except RuntimeError as error:  # raised by `Path.resolve` for a loop of links
+        raise InvalidMission("cannot be written: its symbolic links form a loop", str(path)) from error
 
 
 def _same(path: Path, other: Path) -> bool:
@@ -109,6 +117,8 @@ def _require_place(path: Path) -> None:
             raise InvalidMission("cannot be written: is not a regular file", where=str(path))
         if not (mode & 0o222 and os.access(target, os.W_OK)):
             raise InvalidMission("cannot be written: is write-protected", where=str(path))
+    # Permission bits are not enough: a file system may be read-only. An atomic write makes a new file in the same
+    # folder, so that is what is tried.
     try:
         with tempfile.TemporaryFile(dir=target.parent):
             pass
@@ -128,7 +138,7 @@ def _digest(path: Path) -> bytes | None:
 
 
 def _kept_elsewhere(path: Path, data: bytes) -> Path | None:
-    """Write data to a new file beside another, or among the temporary ones; None where neither can be."""
+    """Write data to a new file beside another, or else to the temporary folder; None if neither is possible."""
     for folder in (path.parent, Path(tempfile.gettempdir())):
         with suppress(OSError):
             return _written_anew(folder, path, data)
@@ -136,11 +146,11 @@ def _kept_elsewhere(path: Path, data: bytes) -> Path | None:
 
 
 def _written_anew(folder: Path, path: Path, data: bytes) -> Path:
-    """A new file, named after another, that holds data; nothing is left of it where it cannot be written."""
+    """A new file with the data, named after another; nothing is left of it if it cannot be written."""
     for number in count(1):
         kept = folder / f"{path.stem}.planned{'' if number == 1 else f'-{number}'}{path.suffix}"
         with suppress(FileExistsError):
-            with kept.open("xb"):  # the name is ours now
+            with kept.open("xb"):  # reserves the name, even against another command
                 pass
             break
     try:

@@ -1,4 +1,4 @@
-"""The measures of a completed Mission File, as an independent referee would take them."""
+"""The measures of a completed Mission File, taken as an independent referee would take them."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from oxbow_certificate.certify import certify
 __all__ = ["GIVEN_AS", "Evaluation", "VehicleEvaluation", "certify_request", "evaluate"]
 
 GIVEN_AS = {"safety_m": "Safety", "zones": "ForbiddenZones"}
-"""What the certificate's fields are called in the Mission File."""
+"""Names in the Mission File of fields of the certificate's request, for errors."""
 
 
 class VehicleEvaluation(Conformance, frozen=True, kw_only=True):
-    """Whether one vehicle's path keeps the rules, those that only the Mission File can tell among them."""
+    """Whether one vehicle's path keeps the rules, including those that only the Mission File sets."""
 
     name: str
     role: Role
@@ -37,10 +37,11 @@ class VehicleEvaluation(Conformance, frozen=True, kw_only=True):
 
 
 class Evaluation(PlanCertificate, frozen=True, kw_only=True):
-    """A certificate with what only the Mission File can tell: the length allowed, and where paths should end.
+    """A certificate, with what only the Mission File sets: the length allowed, and where paths should end.
 
-    Lengths are geodesic, on the ellipsoid. It is about the masters' paths, or the slaves' where there are none;
-    `length_ratio` and the distances of the ends are those of the worst of them. `vehicles` are all of both roles.
+    Lengths are geodesic, on the ellipsoid. The measures are those of the masters' paths, or of the slaves' if
+    there are no masters; `length_ratio` and the distances of the ends are the worst of them. `vehicles` has both
+    roles.
     """
 
     max_length_m: float
@@ -51,14 +52,21 @@ class Evaluation(PlanCertificate, frozen=True, kw_only=True):
 
 
 def certify_request(mission: Mission, site: Site) -> CertifyRequest:
-    """What the stage `certificate` is asked about a mission's paths as they stand in the file.
+    """The request to the stage `certificate` for a mission's paths as they stand in the file.
 
-    These are the paths of the masters; those of the slaves, where there are no others.
+    These are the paths of the masters, or those of the slaves if there are no others.
+
+    Parameters
+    ----------
+    mission
+        A Mission File with a path.
+    site
+        The site of this mission.
 
     Raises
     ------
     InvalidMission
-        There is no path, or one of a vehicle that takes no part.
+        There is no path, or there is one of a vehicle that takes no part.
     """
     paths = list(_paths(mission, site))
     return _request(mission, site, [path for path in paths if path.role is paths[0].role])
@@ -70,7 +78,7 @@ def evaluate(mission: Mission) -> Evaluation:
     Raises
     ------
     InvalidMission
-        There is no path, or one of a vehicle that takes no part, or the mission's geometry breaks a rule.
+        There is no path, there is one of a vehicle that takes no part, or the mission's geometry breaks a rule.
     Infeasible
         The zones or the safety distance leave no water to judge on.
     """
@@ -142,7 +150,7 @@ def _paths(mission: Mission, site: Site) -> Iterator[_Path]:
 
 
 def _request(mission: Mission, site: Site, paths: list[_Path]) -> CertifyRequest:
-    """A survey is judged on all of the free space, a treatment on the hot spots."""
+    """The request for one team: a survey is judged on all of the free space, a treatment on the hot spots."""
     treats = paths[0].role is Role.SLAVE
     first, *others = (path.track for path in paths)
     return CertifyRequest(

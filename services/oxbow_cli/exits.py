@@ -1,4 +1,4 @@
-"""How the command ends: one line on stderr for every error, and the exit status that goes with its code."""
+"""How the command ends: one line on stderr for an error, and the exit status that goes with its code."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from oxbow.errors import ErrorCode, OxbowError
 __all__ = ["DEBUG", "exit_status", "explain"]
 
 DEBUG = "OXBOW_DEBUG"
-"""Environment variable that `--debug` sets, for this process and those that it starts."""
+"""Environment variable that `--debug` sets for this process and those that it starts."""
 
 _STATUS = {
     ErrorCode.INVALID_MISSION: 2,
@@ -30,7 +30,7 @@ def exit_status(error: Exception) -> int:
 
 
 def explain(error: Exception) -> None:
-    """Say on stderr what went wrong, in one line; the traceback only where `DEBUG` is set."""
+    """Report on stderr what went wrong, in one line; with the traceback only if `DEBUG` is set."""
     text = str(error) if isinstance(error, OxbowError) else f"{type(error).__name__}: {error}"
     if DEBUG in os.environ:
         traceback.print_exception(error)

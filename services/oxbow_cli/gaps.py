@@ -60,14 +60,24 @@ _MAGNIFIED_RADII = 3.5
 
 @dataclass(frozen=True)
 class Unit:
-    """What distances are told in: its length, and the name of several."""
+    """The unit in which distances are given: its length, and its name in the plural."""
 
     length_m: float
     name: str
 
     @classmethod
     def of(cls, mission: Mission, judgement: Judgement, *, treats: bool) -> Unit:
-        """The least radius of a survey; half a swath of a treatment, where radii of that length say nothing."""
+        """The least radius for a survey; half a swath for a treatment, where the least radius means nothing.
+
+        Parameters
+        ----------
+        mission
+            The mission.
+        judgement
+            Of its paths.
+        treats
+            Whether the paths treat hot spots.
+        """
         if treats and mission.treated_swath_m is not None:
             return cls(mission.treated_swath_m / 2, "half swaths")
         return cls(judgement.certificate.least_radius_m, "least radii")
@@ -76,7 +86,7 @@ class Unit:
 def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     """Draw the distance of a mission's water to its paths to a PNG or SVG file, and its worst gap.
 
-    The worst gap is drawn magnified beside the water, where there is room and it gets twice as large at least.
+    The worst gap is drawn magnified beside the water, if there is room and it gets at least twice as large.
 
     Parameters
     ----------
@@ -90,7 +100,7 @@ def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     Raises
     ------
     InvalidMission
-        There is no path, the suffix is none of the two, the width is not positive, or the site is not valid.
+        There is no path, the suffix is neither of the two, the width is not positive, or the site is not valid.
     Infeasible
         The zones or the safety distance leave no water to judge on.
     """
@@ -133,7 +143,7 @@ def _note_worst_gap(axes: Axes, judgement: Judgement, unit: Unit) -> None:
 def _draw_magnified(
     figure: Figure, axes: Axes, site: Site, judgement: Judgement, unit: Unit, safety_m: float
 ) -> None:
-    """The worst gap and the legs about it, beside the water; nowhere, where there is no room."""
+    """Draw the worst gap and the legs about it beside the water; nothing if there is no room."""
     x, y = judgement.cover.place
     shown_m = _MAGNIFIED_RADII * judgement.cover.low_m
     side_m = _MAGNIFIED_IN * (axes.get_xlim()[1] - axes.get_xlim()[0]) / figure.get_figwidth()

@@ -1,6 +1,7 @@
-"""Finds processes that are there and do nothing: stopped ones, and ones that answer no ping.
+"""Finds processes that exist but do nothing: stopped ones, and ones that answer no ping.
 
-A process that hangs may well keep its token on the bus, so that callers go on asking it: it has to be killed.
+A process that hangs may keep its token on the bus, so that callers go on sending requests to it: it must be
+killed.
 """
 
 from __future__ import annotations
@@ -27,53 +28,53 @@ from oxbow_cli.supervisor import Child
 __all__ = ["Health", "StoppedProcess", "stopped_processes"]
 
 PERIOD_S = 0.5
-"""How long after one round of pings the next begins."""
+"""The pause between rounds of pings."""
 
 ANSWER_S = 1.5
 """How long a round waits for answers."""
 
 SILENT_S = 3.5
-"""How long a process may answer nothing: one that answers pings does little else."""
+"""How long a process may be silent: the one that answers pings does little else, and so is never busy."""
 
 BUSY_S = 20.0
-"""The same for one that uses the processor: a long computation is no reason to lose what it computes."""
+"""The same for a process that uses the processor: its results should not be lost."""
 
 START_S = 30.0
 """How long a process may take to answer its first ping."""
 
 HANDLES_TO_JOIN = 16
-"""File handles that joining a router takes, and some more."""
+"""File handles that it takes to join a router, with some to spare."""
 
 _BUSY_SHARE = 0.1
-"""A process that uses less of a processor than this does nothing."""
+"""A process that uses less than this fraction of a processor does nothing."""
 
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class _Silence:
-    """How long a process has been silent, and the processor time that it had used when that began."""
+    """How long a process has been silent, and the processor time that it had used before."""
 
     lasted_s: float
     used_before_s: float
 
 
 class Health(Closing):
-    """Watches over the processes of a stack, and tells on the bus (``@processes``) how they are.
+    """Watches over the processes of a stack, and reports their state on the bus (``@processes``).
 
     Parameters
     ----------
     endpoint
         The bus that the processes are on.
     router
-        What routes: it answers no pings, but everything is deaf without it.
+        The router: it answers no pings, but without it nothing else is heard.
     services
-        What answers pings.
+        The processes that answer pings.
 
     Attributes
     ----------
     answering
-        Process ids of what answered the last pings.
+        IDs of the processes that answered the last pings.
     """
 
     def __init__(self, endpoint: str, router: Child, services: Sequence[Child]) -> None:
@@ -88,19 +89,20 @@ class Health(Closing):
         self._asked_at = time.monotonic()
 
     def close(self) -> None:
-        """Leave the bus, until something is asked again."""
+        """Leave the bus, until `ask` joins it again."""
         if self._session is not None:
             self._session.close()
             self._session = None
 
     def ask(self) -> None:
-        """Ping everything; replace what has been silent for too long."""
+        """Ping all processes, and replace those that have been silent for too long."""
         asked = {child.pid: child for child in self._services if child.runs()}
         answered = self._answered()
         self.answering = frozenset(answered or ())
         if answered is None:
             silent = {self._router.pid: self._router}
         else:
+            # A process that has not answered yet may still be starting: it counts as silent only after `START_S`.
             self._known = (self._known | answered) & asked.keys()
             silent = {
                 pid: child
@@ -109,11 +111,12 @@ class Health(Closing):
             }
         self._note(silent)
         for pid, child in silent.items():
+            # The other thread may have replaced the process meanwhile: the new one is not to blame.
             if self._is_hung(pid) and child.pid == pid:
                 child.replace(f"has answered nothing for {self._silences[pid].lasted_s:.1f} s")
 
     def _answered(self) -> set[int] | None:
-        """The process ids of all that answer; None where the router does not let one ask."""
+        """IDs of the processes that answer; None if the router cannot be joined."""
         if self._session is not None and (answered := _pings(self._session)):
             return answered
         # A session may not have noticed yet that its router is gone, or may be what is at fault.
@@ -139,8 +142,9 @@ class Health(Closing):
         return child.trouble or (f"has answered nothing for {silence.lasted_s:.1f} s" if silence else "")
 
     def _note(self, silent: dict[int, Child]) -> None:
-        """Add this round to the silences; time in which nothing was asked does not count."""
+        """Add this round to the silences; time in which nothing was pinged does not count."""
         now = time.monotonic()
+        # This process may have been held up itself: a round counts for no longer than it can last.
         round_s = min(now - self._asked_at, PERIOD_S + ANSWER_S)
         self._asked_at = now
         begun = {pid: _Silence(0.0, _used_s(pid)) for pid in silent} | self._silences
@@ -153,9 +157,9 @@ class Health(Closing):
         return silence.lasted_s >= (BUSY_S if is_busy else SILENT_S)
 
     def look(self) -> None:
-        """Kill what is stopped, as by SIGSTOP: a child, or a process that one has started.
+        """Kill what is stopped, as by SIGSTOP: a child, or a process that a child has started.
 
-        No terminal stops them, since their sessions have none; one that a debugger holds is not taken for stopped.
+        No terminal stops them, since their sessions have none; a process that a debugger holds does not count.
         """
         leaders = {child.pid: child for child in (self._router, *self._services)}
         for each in stopped_processes():
@@ -164,7 +168,7 @@ class Health(Closing):
 
 
 def _pings(session: Session) -> set[int]:
-    """The process ids of all that answer."""
+    """IDs of the processes that answer; empty if the query fails."""
     key = any_introspection_key("ping")
     try:
         replies = session.query(key, timeout_s=ANSWER_S, all_targets=True, may_be_empty=True)
@@ -172,13 +176,13 @@ def _pings(session: Session) -> set[int]:
         return set()
     pids = set()
     for _key, payload in replies:
-        with suppress(msgspec.DecodeError):  # anyone may answer
+        with suppress(msgspec.DecodeError):  # any program on the bus may answer, in any form
             pids.add(msgspec.json.decode(payload, type=Ping).pid)
     return pids
 
 
 def _require_handles() -> None:
-    """Raise `OSError` where this process has too few handles left to join: that says nothing of the router."""
+    """Raise `OSError` if this process has too few handles left to join: then the router is not to blame."""
     with ExitStack() as held:
         for _ in range(HANDLES_TO_JOIN):
             held.enter_context(socket.socket())
@@ -202,7 +206,7 @@ class StoppedProcess:
 
 
 def stopped_processes() -> Iterator[StoppedProcess]:
-    """All stopped processes of this machine, where there is a ``/proc`` that tells."""
+    """All stopped processes of this machine; none where there is no ``/proc``."""
     for file in Path("/proc").glob("[0-9]*/stat"):
         fields = _fields(file)
         if fields and fields[0] == "T":
@@ -210,14 +214,15 @@ def stopped_processes() -> Iterator[StoppedProcess]:
 
 
 def _used_s(pid: int) -> float:
-    """Processor time that a process has used; 0 where the system does not tell."""
+    """Processor time that a process has used, in seconds; 0 if it is unknown."""
     fields = _fields(Path(f"/proc/{pid}/stat"))
     return sum(map(int, fields[11:13])) / os.sysconf("SC_CLK_TCK")
 
 
 def _fields(stat: Path) -> list[str]:
-    """What follows the name in ``/proc/PID/stat``: state, parent, group, session, ...; nothing once it is gone."""
+    """The fields after the name in ``/proc/PID/stat``: state, parent, group, session, ...; none if it is gone."""
     try:
+        # The last bracket closes the name, which may contain brackets and blanks itself.
         return stat.read_text().rpartition(")")[2].split()
     except OSError:
         return []

@@ -15,5 +15,5 @@ def home_folder(home: Path | None) -> Path:
 
 
 def recordings_folder(home: Path | None) -> Path:
-    """Where recordings are kept, one file a mission."""
+    """Where recordings are kept, one file per mission."""
     return home_folder(home) / "recordings"

@@ -1,7 +1,8 @@
-"""How a command ends when it is asked to: by Ctrl-C, SIGTERM or SIGHUP.
+"""How a command ends when it is asked to, by Ctrl-C, SIGTERM or SIGHUP.
 
-A command with nothing to tidy leaves at once: an exception, raised wherever the interpreter happens to be, would
-surface as another one, or be swallowed, as while a library is imported. One that has started processes unwinds.
+A command with nothing to clean up ends at once: an exception, raised wherever the interpreter happens to be, could
+surface as another one or be swallowed, for instance while a library is imported. A command that has started
+processes unwinds.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ _SHOW_CURSOR = b"\x1b[?25h\n"
 
 
 class Ending:
-    """The one answer of this process to the signals that ask it to end.
+    """The response of this process to the signals that ask it to end.
 
     Attributes
     ----------
     status
-        The exit status that goes with the signal received; None where there was none.
+        The exit status that goes with the signal received; None before there is one.
     """
 
     def __init__(self) -> None:
@@ -34,14 +35,14 @@ class Ending:
         self._held = False
 
     def begin(self) -> None:
-        """Answer signals from now on, those that are ignored (as nohup leaves them) excepted."""
+        """Respond to signals from now on, except those that are ignored, as nohup leaves SIGHUP."""
         for number in _SIGNALS:
             if signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, self._on_signal)
 
     @contextmanager
     def orderly(self) -> Iterator[None]:
-        """Within, a first signal leaves through every `with`, and a second one at once."""
+        """Within this context, a first signal unwinds the stack; a second one ends the process at once."""
         self._unwinds = True
         try:
             yield
@@ -50,7 +51,7 @@ class Ending:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Within, nothing ends: for what is short, and should not be left half done."""
+        """Within this context, a signal waits: for short work that should not be left half done."""
         self._held = True
         try:
             yield
@@ -74,7 +75,7 @@ class Ending:
 
 
 def _leave(status: int) -> None:
-    """End the process, its terminal as a progress bar may have left it put right."""
+    """End the process, after showing the cursor again, which a progress bar may have hidden."""
     if os.isatty(2):
         os.write(2, _SHOW_CURSOR)
     os._exit(status)

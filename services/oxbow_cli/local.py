@@ -12,9 +12,9 @@ __all__ = ["local_call"]
 
 
 def local_call(show: Show = discard) -> LocalCall:
-    """A call that runs each stage's handler here; the algorithms' imports are paid at this point.
+    """A call that runs each stage's handler in this process; calling this imports the algorithms.
 
-    Stage ``x`` is the package ``oxbow_x``, whose module `service` has the handler: as when it is a process.
+    The handler of stage ``x`` is that of ``oxbow_x.service``, the same as in a process of its own.
     """
     handlers: dict[str, Handler] = {
         endpoint.stage: import_module(f"oxbow_{endpoint.stage}.service").handle for endpoint in STAGES

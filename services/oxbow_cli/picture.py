@@ -1,8 +1,8 @@
-"""A picture of a completed Mission File: the water, what keeps the paths off it, hot spots, and the paths.
+"""A picture of a completed Mission File: the water, what paths must avoid, hot spots, and the paths.
 
-One path is coloured by its progress, so that its direction can be followed; the paths of several vehicles have a
-colour each. Marked are the ends of the paths, the widest gap of a survey, water that the plan leaves out, and hot
-spots that it does not treat.
+A single path is coloured by its progress, so that its direction can be followed; the paths of several vehicles
+have one colour each. Marks show the ends of the paths, the widest gap of a survey, water that the plan leaves out,
+and hot spots that it does not treat.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ DANGER = "#d9822b"
 
 
 def draw(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
-    """Draw a mission to a PNG or SVG file; one that has no path yet is drawn as its site alone, which it says.
+    """Draw a mission to a PNG or SVG file; without a path, the site alone is drawn, and the picture says so.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def draw(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     Raises
     ------
     InvalidMission
-        The suffix is none of the two, the width is not positive, or the site is not valid.
+        The suffix is neither of the two, the width is not positive, or the site is not valid.
     """
     sheet.checked_format(path, width_px)
     with sheet.lettering():
@@ -79,7 +79,7 @@ def _draw(mission: Mission, site: Site, path: Path, width_px: int) -> None:
 
 
 def _draw_danger(axes: Axes, site: Site) -> None:
-    """Danger zones, as far as they are water, hatched, with their names and dangers."""
+    """Draw the parts of danger zones in the water, hatched, with their names and dangers."""
     style = {"facecolor": "none", "edgecolor": DANGER, "hatch": r"\\\\", "linewidth": 0.8, "zorder": 3.5}
     for zone in site.danger_zones:
         water = zone.area.intersection(site.outline)
@@ -90,7 +90,7 @@ def _draw_danger(axes: Axes, site: Site) -> None:
 
 
 def _draw_path(axes: Axes, xy: FloatArray, spacing_m: float) -> None:
-    """The path in pieces of equal length, each of one colour; its legs are kept apart whatever the spacing."""
+    """Draw the path in pieces of equal length, each of one colour, thin enough to keep its legs apart."""
     axes.add_collection(
         LineCollection(
             _pieces(xy),
@@ -106,14 +106,14 @@ def _draw_path(axes: Axes, xy: FloatArray, spacing_m: float) -> None:
 
 
 def _draw_fleet(axes: Axes, paths: list[FloatArray], spacing_m: float) -> None:
-    """The path of each vehicle in a colour of its own; legs of the least spacing are kept apart."""
+    """Draw the path of each vehicle in its own colour, thin enough to keep legs of the least spacing apart."""
     for xy, colour in zip(paths, cycle(FLEET)):
         axes.plot(*xy.T, color=colour, linewidth=sheet.line_width(axes, spacing_m), zorder=4)
     axes.autoscale(False)
 
 
 def _pieces(xy: FloatArray) -> list[FloatArray]:
-    """A path cut at equal steps of its length."""
+    """A path cut into pieces of equal length."""
     at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
     cuts = np.linspace(0.0, at[-1], _COLOURS + 1)
     ends = np.column_stack([np.interp(cuts, at, xy[:, axis]) for axis in (0, 1)])
@@ -125,7 +125,7 @@ def _pieces(xy: FloatArray) -> list[FloatArray]:
 
 
 def _draw_findings(axes: Axes, mission: Mission, site: Site) -> None:
-    """What the plan says it leaves out, and the disc that a survey's widest gap would hold."""
+    """Draw what the plan leaves out, and the disc that fits in a survey's widest gap."""
     if mission.plan is None:
         return
     for part in mission.plan.dropped:
@@ -137,7 +137,7 @@ def _draw_findings(axes: Axes, mission: Mission, site: Site) -> None:
         place = spot.area.representative_point()
         sheet.note(axes, (place.x, place.y), f"{spot.name}: not treated", colour=GAP)
     certificate = mission.plan.certificate
-    # Of a treatment, half a swath is what every pass leaves on either side.
+    # A treatment has no such gap: every pass leaves half a swath on either side.
     if certificate.worst_gap is not None and mission.mission_type is not MissionType.TREAT:
         x, y = site.frame.to_planar(lonlat([certificate.worst_gap]))[0]
         radius_m = certificate.cover_radius_m[0]
@@ -152,7 +152,7 @@ def _draw_progress_key(figure: Figure) -> None:
 
 
 def _draw_names_key(figure: Figure, names: list[str]) -> None:
-    """The colours of the vehicles, in the footer, where they hide no water."""
+    """Draw the key of the vehicles' colours in the footer, where it hides no water."""
     lines = [Line2D([], [], color=colour) for _, colour in zip(names, cycle(FLEET))]
     key = figure.legend(
         lines,
@@ -172,7 +172,7 @@ def _draw_names_key(figure: Figure, names: list[str]) -> None:
 
 
 def _figures(mission: Mission) -> str:
-    """The line below the title: what was planned, how densely, and how near it is to the best possible."""
+    """The line below the title: what is planned, how densely, and how near it is to the best possible."""
     if not mission.planned_paths:
         return "no path yet: the site alone"
     if mission.plan is None:
@@ -189,7 +189,7 @@ def _figures(mission: Mission) -> str:
 
 
 def _paths_text(plan: PlanRecord) -> str:
-    """How many paths there are, those of slaves included, and their length."""
+    """The number of paths, those of slaves included, and their total length."""
     lengths_m = [plan.length_m] if plan.fleet is None else [vehicle.length_m for vehicle in plan.fleet.vehicles]
     paths = f"{len(lengths_m)} paths" if len(lengths_m) > 1 else "path"
     return f"{paths} {sheet.distance_text(sum(lengths_m))}"

@@ -32,7 +32,7 @@ from oxbow_cli.stack import StackSettings, running_stack
 __all__ = ["Planned", "PlanningJob", "Progress", "plan_embedded", "plan_here", "plan_on"]
 
 CONNECT_S = 3.0
-"""How long a router and a mission service may take to answer; where they are up, they do in milliseconds."""
+"""How long a router and a mission service may take to answer; running ones do so in milliseconds."""
 
 _log = logging.getLogger(__name__)
 
@@ -40,14 +40,25 @@ Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
 
 Progress = Callable[[str, float], None]
-"""Called with the stage that is at work and the fraction of the mission that is done."""
+"""Called with the stage at work and the fraction of the mission that is done, 0 to 1."""
 
 
 @dataclass(frozen=True)
 class PlanningJob:
-    """A mission to plan, how, for how long, whom to tell how far it is, and what to do with the plan.
+    """A mission to plan.
 
-    `keep` is called with the completed mission as soon as there is one, before anything else can fail.
+    Parameters
+    ----------
+    mission
+        The mission.
+    options
+        How to plan it.
+    timeout_s
+        After how many seconds to give up.
+    progress
+        Called whenever there is progress.
+    keep
+        Called with the completed mission as soon as there is one, before anything else can fail.
     """
 
     mission: Mission
@@ -59,14 +70,20 @@ class PlanningJob:
 
 @dataclass(frozen=True)
 class Planned:
-    """A completed mission, and its recording where there is one in reach."""
+    """A completed mission, and its recording; None if there is none in reach."""
 
     mission: Mission
     recording: Path | None = None
 
 
 def plan_here(job: PlanningJob) -> Planned:
-    """Plan in this process, without a bus and without a recording."""
+    """Plan in this process, without a bus and without a recording; only from the main thread.
+
+    Raises
+    ------
+    DeadlineExceeded
+        There is no plan within the job's time.
+    """
     with _deadline(job.timeout_s):
         call = _Reported(local_call(), job.progress, expected_calls(job.mission))
         planned = plan_mission(job.mission, job.options, call=call)
@@ -75,7 +92,20 @@ def plan_here(job: PlanningJob) -> Planned:
 
 
 def plan_on(job: PlanningJob, endpoint: str) -> Planned:
-    """Plan on the stack that listens at `endpoint`; its recorder keeps the recording."""
+    """Plan on a running stack; its recorder keeps the recording.
+
+    Parameters
+    ----------
+    job
+        What to plan.
+    endpoint
+        Where the stack's router listens.
+
+    Raises
+    ------
+    DeadlineExceeded
+        There is no plan within the job's time.
+    """
 
     def note(status: MissionStatus) -> None:
         job.progress(status.stage or status.state, status.fraction)
@@ -92,25 +122,29 @@ def plan_on(job: PlanningJob, endpoint: str) -> Planned:
 
 
 def plan_embedded(job: PlanningJob, recording: Path | None, recordings: Path) -> Planned:
-    """Plan on a stack of this command's own, which is stopped afterwards.
+    """Plan on a stack that is started for this plan and stopped afterwards.
 
     Parameters
     ----------
+    job
+        What to plan.
     recording
-        Where the recording goes; where absent, into the folder `recordings` under the mission's id.
+        Where the recording goes; None for the folder `recordings`, under the mission's ID.
+    recordings
+        The folder of recordings that are not given a place.
     """
     with ending.orderly(), scratch_folder() as scratch:
         settings = StackSettings(endpoint=free_endpoint(), home=scratch, recordings=scratch)
         with running_stack(settings, output=None if DEBUG in os.environ else subprocess.DEVNULL):
             planned = plan_on(job, settings.endpoint).mission
-        # The recorder has closed its file by now; where it failed, the plan is worth having all the same.
+        # The recorder has closed its file by now. If it failed, the plan is worth having even so.
         assert planned.plan is not None
         made = scratch / f"{planned.plan.mission_id}.rrd"
         return Planned(planned, _kept_recording(made, recording or recordings / made.name))
 
 
 def _kept_recording(made: Path, target: Path) -> Path | None:
-    """Where a recording is kept; nowhere, with a warning, where that cannot be: the plan is there already."""
+    """Where a recording is kept; None, with a warning, if it cannot be: the plan itself is already kept."""
     if not made.exists():
         return None
     try:
@@ -124,7 +158,7 @@ def _kept_recording(made: Path, target: Path) -> Path | None:
 
 
 class _Reported:
-    """A call that tells the progress before each stage."""
+    """A call that reports progress before each stage."""
 
     def __init__(self, call: Call, progress: Progress, expected: int) -> None:
         self.call = call
@@ -140,7 +174,7 @@ class _Reported:
 
 @contextmanager
 def _named_timeout(timeout_s: float) -> Iterator[None]:
-    """Say which option set the time that was too short."""
+    """Report a time that was too short under the option that set it."""
     try:
         yield
     except DeadlineExceeded as error:
@@ -153,7 +187,10 @@ def _too_late(timeout_s: float) -> DeadlineExceeded:
 
 @contextmanager
 def _deadline(timeout_s: float) -> Iterator[None]:
-    """Raise `DeadlineExceeded` in the main thread after `timeout_s`."""
+    """Raise `DeadlineExceeded` in the main thread after `timeout_s`.
+
+    By an alarm, since the algorithms run in this very thread.
+    """
 
     def give_up(_number: int, _frame: FrameType | None) -> None:
         raise _too_late(timeout_s)

@@ -1,4 +1,4 @@
-"""What the command shows: a progress bar on stderr, tables and JSON on stdout."""
+"""Output of the command: a progress bar on stderr, tables and JSON on stdout."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ Rows = Iterable[tuple[str, str]]
 
 
 def _console() -> Console:
-    """Stdout, on which a site's name or an error is plain text, whatever it contains."""
+    """Stdout, where the name of a site or an error is plain text, whatever it contains."""
     return Console(markup=False, emoji=False, highlight=False)
 
 
@@ -53,13 +53,13 @@ def print_json(document: Any) -> None:
 
 
 def _path_text(path: Path) -> str:
-    """A path, those bytes of it as escapes that are no text."""
+    """A path as text; bytes that are not text are escaped."""
     return os.fspath(path).encode(errors="backslashreplace").decode()
 
 
 @contextmanager
 def progress_bar(shown: bool) -> Iterator[Progress]:
-    """A bar on stderr while a mission is planned; nothing where `shown` is false or stderr is no terminal."""
+    """A bar on stderr while a mission is planned; none if `shown` is false or stderr is not a terminal."""
     console = Console(stderr=True)
     if not (shown and console.is_terminal):
         yield lambda _stage, _fraction: None
@@ -73,12 +73,28 @@ def progress_bar(shown: bool) -> Iterator[Progress]:
 
 
 def plan_document(planned: Planned, file: Path) -> dict[str, Any]:
-    """What `--json` prints of a plan."""
+    """The document that `oxbow plan --json` prints.
+
+    Parameters
+    ----------
+    planned
+        The completed mission.
+    file
+        Where it was written.
+    """
     return {"file": file, "recording": planned.recording, "Plan": planned.mission.plan}
 
 
 def print_plan(planned: Planned, file: Path) -> None:
-    """Write a plan's table to stdout, and where its files are: one a line, never wrapped, to be copied."""
+    """Write a plan's table to stdout, and where its files are: one per line, never wrapped, for copying.
+
+    Parameters
+    ----------
+    planned
+        The completed mission.
+    file
+        Where it was written.
+    """
     plan = planned.mission.plan
     assert plan is not None
     _console().print(_plan_table(planned.mission.site_name or file.name, plan))
@@ -88,7 +104,7 @@ def print_plan(planned: Planned, file: Path) -> None:
 
 
 def _plan_table(site: str, plan: PlanRecord) -> Table:
-    """A plan in the measures that its user asks for first."""
+    """A plan in the measures that matter most to a user."""
     certificate = plan.certificate
     rows = [
         *(() if plan.mission_id is None else [("mission", f"{plan.mission_id}, revision {plan.revision}")]),
@@ -112,7 +128,7 @@ def _plan_table(site: str, plan: PlanRecord) -> Table:
 
 
 def _surveys(plan: PlanRecord) -> bool:
-    """Whether the plan's own figures are those of a survey; else, they are a treatment's."""
+    """Whether the plan's own measures are those of a survey; otherwise, they are a treatment's."""
     return plan.treatment is None or plan.slave_certificate is not None
 
 
@@ -140,14 +156,14 @@ def _quality_rows(found: Measures) -> Rows:
 
 
 def _reach_rows(plan: PlanRecord) -> Rows:
-    """How far from the passes the hot spots reach; no path of that length could be a measure for it."""
+    """How far from the passes the hot spots reach; the least radius of a path is no yardstick for that."""
     low_m, high_m = plan.certificate.cover_radius_m
     text = f"{low_m:.1f} to {high_m:.1f} m from a pass; half a swath is {plan.spacing_m / 2:.1f} m"
     yield "farthest treated", text
 
 
 def _fleet_rows(plan: PlanRecord) -> Rows:
-    """A row for each vehicle, and what becomes of hot spots."""
+    """A row for each vehicle, then for each hot spot, further sortie, and hot spot left."""
     for vehicle in () if plan.fleet is None else plan.fleet.vehicles:
         way = f"{_length(vehicle.length_m)} of {_length(vehicle.max_length_m)}, {_duration(vehicle.duration_s)}"
         task = f"treats {', '.join(vehicle.hot_spots)}" if vehicle.hot_spots else "surveys"
@@ -169,7 +185,15 @@ def _fleet_rows(plan: PlanRecord) -> Rows:
 
 
 def print_evaluation(site: str, found: Evaluation) -> None:
-    """Write every measure of an evaluation to stdout, under its name."""
+    """Write every measure of an evaluation to stdout, under its name.
+
+    Parameters
+    ----------
+    site
+        The title of the table: the site or the file.
+    found
+        The evaluation.
+    """
     rows = ((name, _figure(value)) for name, value in msgspec.structs.asdict(found).items())
     console = _console()
     console.print(_table(f"Evaluation of {site}", rows))
@@ -179,12 +203,28 @@ def print_evaluation(site: str, found: Evaluation) -> None:
 
 
 def comparison_document(files: tuple[Path, Path], found: Comparison) -> dict[str, Any]:
-    """What `--json` prints of a comparison."""
+    """The document that `oxbow evaluate --compare --json` prints.
+
+    Parameters
+    ----------
+    files
+        The two files.
+    found
+        Their comparison, in the same order.
+    """
     return {"files": files} | msgspec.structs.asdict(found)
 
 
 def print_comparison(files: tuple[Path, Path], found: Comparison) -> None:
-    """Write two evaluations side by side to stdout, the better figure marked, and who is better at what."""
+    """Write two evaluations side by side to stdout, the better value marked, and by which measures each is better.
+
+    Parameters
+    ----------
+    files
+        The two files.
+    found
+        Their comparison, in the same order.
+    """
     table = _grid("Comparison; * is better, by more than 1 %", left=("measure",), right=())
     for file in files:
         table.add_column(str(file), justify="right", overflow="fold")
@@ -262,7 +302,7 @@ def _table(title: str, rows: Rows) -> Table:
 
 
 def _conformance(is_simple: bool | None, found: Conformance) -> str:
-    """Whether the rules are kept, and what the legs need; None where a path may cross itself."""
+    """Whether the rules are kept, and what legs need; `is_simple` is None if a path may cross itself."""
     simple = {None: "", True: "never crosses itself; ", False: "CROSSES ITSELF; "}[is_simple]
     ashore_m, unsafe_m = _of_legs(found)
     legs = f"; on its legs {ashore_m:.2f} m over land, {unsafe_m:.0f} m within Safety" if unsafe_m else ""
@@ -271,12 +311,12 @@ def _conformance(is_simple: bool | None, found: Conformance) -> str:
 
 
 def _of_legs(found: Conformance) -> tuple[float, float]:
-    """Metres of the legs over land, and nearer to the shore than Safety."""
+    """Metres of the legs over land, and metres nearer to the shore than Safety."""
     return sum(leg.ashore_m for leg in found.legs), sum(leg.unsafe_m for leg in found.legs)
 
 
 def _dropped(plan: PlanRecord) -> Iterator[str]:
-    """The largest parts of the water that the plan leaves out; the file lists them all."""
+    """The largest parts of the water that the plan leaves out; the file lists all."""
     parts = sorted(plan.dropped, key=lambda part: -part.area_m2)
     for part in parts[:MOST_DROPPED]:
         yield f"{part.area_m2:.0f} m2 at {_place(part.place)}: {part.reason}"
@@ -302,7 +342,7 @@ def _place(place: Position) -> str:
 
 
 def _figure(value: Any) -> str:
-    """A measure as text: six digits, bounds with two dots between them, none as a dash."""
+    """A measure as text: six digits, bounds with two dots between them, a dash for None."""
     if value is None:
         return "-"
     if isinstance(value, Position):

@@ -1,4 +1,4 @@
-"""A folder for as long as a command needs it; what commands that were killed left is swept by the next one."""
+"""A folder for as long as a command needs it; what killed commands have left is removed by the next one."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["scratch_folder"]
 
 _PREFIX = "oxbow-plan-"
 _LEAST_AGE_S = 60.0
-"""Younger ones stay: their owner may be about to lock them, and its children may still be at their end."""
+"""Younger folders stay: their owner may be about to lock them, and its children may still be ending."""
 
 
 @contextmanager
@@ -32,7 +32,7 @@ def scratch_folder() -> Iterator[Path]:
 
 
 def _sweep(folder: Path) -> None:
-    """Remove this user's folders of that name that no process has locked any more."""
+    """Remove this user's folders of that name that no process holds a lock on."""
     with suppress(OSError):
         for entry in list(os.scandir(folder)):
             if entry.name.startswith(_PREFIX):
@@ -45,6 +45,7 @@ def _remove_left(entry: os.DirEntry[str]) -> None:
     is_old = time.time() - status.st_mtime > _LEAST_AGE_S
     if not (entry.is_dir(follow_symlinks=False) and status.st_uid == os.getuid() and is_old):
         return
+    # Others can write to the folder of temporary files as well: a symbolic link must not be followed out of it.
     descriptor = os.open(entry.path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,4 +1,4 @@
-"""The sheet that pictures of a mission are drawn on: map, land and water, scale, header, and the file."""
+"""The sheet for pictures of a mission: map, land and water, scale, header, and the file."""
 
 from __future__ import annotations
 
@@ -61,9 +61,9 @@ FORBIDDEN, FORBIDDEN_EDGE, GAP = "#e8d8c3", "#b5805a", "#c8322b"
 _DPI = 200
 _HEADER_IN, _FOOTER_IN = 0.85, 0.75
 _TOGETHER_M = 1.0
-"""Ends of paths that are no farther apart are drawn as one."""
+"""Ends of paths nearer to each other than this are drawn as one."""
 _HEADER_END = 0.94
-"""Where the arrow to the north begins, as a share of the sheet's width."""
+"""Where the north arrow begins, as a fraction of the sheet's width."""
 _SMALLEST_PT = 8.0
 _MOST_CHARACTERS = 400
 _FALLBACK_FONTS = (
@@ -86,6 +86,13 @@ _HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
 def checked_format(path: Path, width_px: int) -> str:
     """The format that a picture's name asks for.
 
+    Parameters
+    ----------
+    path
+        The picture's file.
+    width_px
+        Its width, >= 1.
+
     Raises
     ------
     InvalidMission
@@ -99,7 +106,17 @@ def checked_format(path: Path, width_px: int) -> str:
 
 
 def save_sheet(figure: Figure, path: Path, width_px: int) -> None:
-    """Write a sheet to its file, as a whole."""
+    """Write a sheet to its file, as a whole.
+
+    Parameters
+    ----------
+    figure
+        The sheet.
+    path
+        The file; its suffix chooses the format.
+    width_px
+        Width of the picture, in pixels.
+    """
     kind = checked_format(path, width_px)
     picture = io.BytesIO()
     metadata = {"Date": None} if kind == "svg" else {}
@@ -129,7 +146,22 @@ def new_sheet(site: Site) -> tuple[Figure, Axes]:
 
 
 def draw_site(axes: Axes, site: Site, safety_m: float) -> None:
-    """Land, zones, the water that the safety distance keeps, and the rest of the water."""
+    """Draw land, zones, water within the safety distance, and the rest of the water.
+
+    Parameters
+    ----------
+    axes
+        The map.
+    site
+        What is drawn.
+    safety_m
+        The safety distance.
+
+    Raises
+    ------
+    InvalidMission
+        The zones leave no water.
+    """
     water = site.outline.difference(shapely.union_all(site.zones))
     if not isinstance(water, Polygon | MultiPolygon):
         raise InvalidMission("leaves no water within the outline", where="ForbiddenZones")
@@ -150,7 +182,7 @@ def draw_site(axes: Axes, site: Site, safety_m: float) -> None:
 
 
 def patch(geometry: BaseGeometry, **style: object) -> PathPatch:
-    """Polygons, holes and all, as one patch."""
+    """Polygons with their holes as one patch; `style` is that of `PathPatch`."""
     polygons = [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon)]
     rings = [ring for polygon in polygons for ring in (polygon.exterior, *polygon.interiors)]
     outlines = [Outline(shapely.get_coordinates(ring), closed=True) for ring in rings if not ring.is_empty]
@@ -158,7 +190,15 @@ def patch(geometry: BaseGeometry, **style: object) -> PathPatch:
 
 
 def draw_ends(axes: Axes, site: Site) -> None:
-    """The launch and recovery points, and those that a vehicle has to itself."""
+    """Draw the launch and recovery points, and those that a vehicle has of its own.
+
+    Parameters
+    ----------
+    axes
+        The map.
+    site
+        The site.
+    """
     drawn: list[Place] = []
     for place, marker, label in _ends(site):
         if any(math.dist(place, other) < _TOGETHER_M for other in drawn):
@@ -182,7 +222,19 @@ def _ends(site: Site) -> Iterator[tuple[Place, str, str]]:
 
 
 def note(axes: Axes, place: Place, text: str, *, colour: str) -> None:
-    """A label beside a place, on the side that has room."""
+    """Write a label beside a place, on the side that has room.
+
+    Parameters
+    ----------
+    axes
+        The map.
+    place
+        What is labelled, in metres.
+    text
+        Plain text.
+    colour
+        Of the text.
+    """
     west, east = axes.get_xlim()
     right = place[0] < west + 0.8 * (east - west)
     axes.annotate(
@@ -200,14 +252,14 @@ def note(axes: Axes, place: Place, text: str, *, colour: str) -> None:
 
 
 def noted(axes: Axes) -> BaseGeometry:
-    """What the labels on a map cover."""
+    """The area that the labels on a map cover, in metres of the map."""
     to_data = axes.transData.inverted()
     corners = [to_data.transform(text.get_window_extent().get_points()) for text in axes.texts]
     return shapely.union_all([shapely.box(*low, *high) for low, high in corners])
 
 
 def draw_scale_and_north(axes: Axes) -> None:
-    """A scale bar of a round length below the map, and an arrow to the north above it."""
+    """Draw a scale bar of a round length below the map, and a north arrow above it."""
     (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
     bar_m = _round_down(0.2 * (east - west))
     x, y = west + 0.04 * (east - west), south - 0.35 * _FOOTER_IN * (north - south) / _map_height_in(axes)
@@ -240,14 +292,32 @@ def draw_scale_and_north(axes: Axes) -> None:
 
 
 def line_width(axes: Axes, spacing_m: float) -> float:
-    """Width in points at which legs are kept apart, whatever their spacing."""
+    """The width of a line that keeps legs apart, in points; within limits that can be seen.
+
+    Parameters
+    ----------
+    axes
+        The map.
+    spacing_m
+        The spacing of legs.
+    """
     west, east = axes.get_xlim()
     points_per_m = axes.figure.get_window_extent().width / axes.figure.dpi * 72 / (east - west)
     return min(max(0.3 * spacing_m * points_per_m, 0.35), 1.6)
 
 
 def draw_disc(axes: Axes, place: Place, radius_m: float) -> None:
-    """The disc that a gap would hold."""
+    """Draw the disc that fits in a gap.
+
+    Parameters
+    ----------
+    axes
+        The map.
+    place
+        Its centre, in metres.
+    radius_m
+        Its radius.
+    """
     axes.add_patch(
         Circle(place, radius_m, facecolor="none", edgecolor=GAP, linewidth=1.1, linestyle=(0, (3, 2)), zorder=6)
     )
@@ -258,7 +328,22 @@ def _map_height_in(axes: Axes) -> float:
 
 
 def add_key(figure: Figure, left: float, width: float, cmap: str | Colormap) -> Axes:
-    """A strip of a colour map in the sheet's footer, from 0 to 1 along its x axis."""
+    """Draw a strip of a colour map in the sheet's footer.
+
+    Parameters
+    ----------
+    figure
+        The sheet.
+    left, width
+        Where the strip lies, as fractions of the sheet's width.
+    cmap
+        The colour map.
+
+    Returns
+    -------
+    Axes
+        Of the strip, from 0 to 1 along x and y.
+    """
     height_in = figure.get_figheight()
     key = figure.add_axes((left, 0.36 / height_in, width, 0.1 / height_in))
     key.imshow(np.linspace(0, 1, 256)[None, :], aspect="auto", cmap=cmap, extent=(0, 1, 0, 1))
@@ -267,7 +352,17 @@ def add_key(figure: Figure, left: float, width: float, cmap: str | Colormap) -> 
 
 
 def draw_header(figure: Figure, title: str, figures: str) -> None:
-    """The site's name, and a line of figures below it; what is too long for the sheet is smaller, then cut."""
+    """Write a title, and a line of figures below it; text that is too long is made smaller, then cut.
+
+    Parameters
+    ----------
+    figure
+        The sheet.
+    title
+        The site's name, say; of any length.
+    figures
+        One line.
+    """
     top = 1 - 0.38 / figure.get_figheight()
     title = " ".join(title.split())
     named = figure.text(0.04, top, title, fontsize=15, weight="bold", color=INK, parse_math=False)
@@ -278,7 +373,7 @@ def draw_header(figure: Figure, title: str, figures: str) -> None:
 
 
 def _fit(figure: Figure, text: Text) -> None:
-    """Keep a line of the header off the arrow to the north."""
+    """Keep a line of the header clear of the north arrow."""
     room = (_HEADER_END - text.get_position()[0]) * figure.get_window_extent().width
     whole, shown = text.get_text(), _MOST_CHARACTERS
     if len(whole) > shown:
@@ -292,7 +387,7 @@ def _fit(figure: Figure, text: Text) -> None:
 
 @contextmanager
 def lettering() -> Iterator[None]:
-    """Within, names are written in the fonts here that have their characters; others are boxes, which is said."""
+    """Within this context, text is drawn in fonts that have its characters; a note names those without any."""
     installed = set(font_manager.get_font_names())
     families = [*rcParams["font.sans-serif"][:1], *(name for name in _FALLBACK_FONTS if name in installed)]
     with warnings.catch_warnings(record=True) as caught, rc_context({"font.family": families}):
@@ -305,7 +400,7 @@ def lettering() -> Iterator[None]:
         else:
             warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     if missing:
-        _log.warning("note: no font here has %s: drawn as boxes", "".join(sorted(missing)))
+        _log.warning("note: no installed font has %s: drawn as boxes", "".join(sorted(missing)))
 
 
 def _round_down(length_m: float) -> float:
@@ -315,10 +410,10 @@ def _round_down(length_m: float) -> float:
 
 
 def distance_text(length_m: float) -> str:
-    """A length to be read: kilometres or metres."""
+    """A length for readers, in kilometres or metres."""
     return f"{length_m / 1000:,.4g} km" if length_m >= 1000 else f"{length_m:.3g} m"
 
 
 def area_text(area_m2: float) -> str:
-    """An area to be read: square kilometres or metres."""
+    """An area for readers, in square kilometres or metres."""
     return f"{area_m2 / 1e6:.3g} km²" if area_m2 >= 1e4 else f"{area_m2:.3g} m²"

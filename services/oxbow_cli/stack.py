@@ -20,7 +20,7 @@ from oxbow_cli.supervisor import Child, Supervisor
 __all__ = ["SERVICES", "StackSettings", "running_stack"]
 
 START_S = 30.0
-"""How long a stack may take to come up, on a machine that is busy."""
+"""How long a stack may take to become ready, even on a busy machine."""
 
 _ATTEMPT_S = 1.0
 _LOOK_S = 0.02
@@ -43,7 +43,12 @@ class StackSettings:
     recordings
         The recorder's folder.
     replicas
-        Processes of each stage, one where it is not named.
+        The number of processes of each stage; 1 if it is not named.
+
+    Raises
+    ------
+    InvalidMission
+        A stage is unknown, or its number is less than 1.
     """
 
     endpoint: str
@@ -63,13 +68,15 @@ class StackSettings:
 def running_stack(settings: StackSettings, output: int | None = None) -> Iterator[None]:
     """A stack that is ready, for as long as the context lasts.
 
-    A process that ends, is stopped or hangs is started again. All of them end with the context, or with
-    this process however it dies.
+    A process that ends, is stopped or hangs is restarted. All of them end with the context, or with this process,
+    however it dies.
 
     Parameters
     ----------
+    settings
+        What to start.
     output
-        A file descriptor for what the processes log; where absent, this process's stderr.
+        A file descriptor for the logs of the processes; by default this process's stderr.
 
     Raises
     ------
@@ -77,7 +84,7 @@ def running_stack(settings: StackSettings, output: int | None = None) -> Iterato
         A process ended before it was ready, or was not ready after `START_S`.
     """
     with Supervisor(output) as supervisor:
-        with ending.held():  # a process that is started is known to the supervisor
+        with ending.held():  # so that the supervisor knows every process that was started
             started = _start(supervisor, settings)
         give_up = time.monotonic() + START_S
         with _connected(settings.endpoint, supervisor, give_up) as bus:
@@ -107,7 +114,7 @@ class _Started:
 
 
 def _start(supervisor: Supervisor, settings: StackSettings) -> _Started:
-    """Start everything at once, since the services wait for the router."""
+    """Start everything at once: the services wait for the router themselves."""
     parent = ("--parent", str(os.getpid()))
     listen = ("--listen", settings.endpoint)
     router = supervisor.start("router", ["-m", "oxbow.bus.router", *listen, *parent], rank=0)
@@ -118,7 +125,7 @@ def _start(supervisor: Supervisor, settings: StackSettings) -> _Started:
             instance = f"{os.getpid()}-{number}"
             options = ("--connect", settings.endpoint, "--instance", instance, *own_options.get(service, ()))
             arguments = ["-m", f"oxbow_{service}", *map(str, options), *parent]
-            # The recorder outlives the stages, whose last layers it is to write.
+            # The recorder is stopped after the stages, whose last layers it has to write.
             child = supervisor.start(f"{service}-{number}", arguments, rank=1 if service == "recorder" else 2)
             started.append(_Service(service, instance, child))
     return _Started(router, tuple(started))
@@ -135,7 +142,7 @@ def _connected(endpoint: str, supervisor: Supervisor, give_up: float) -> Bus:
 
 
 def _wait_ready(bus: Bus, started: Iterable[_Service], supervisor: Supervisor, give_up: float) -> None:
-    """Wait for every process by its own name: another stack's would not do."""
+    """Wait for every process by its own name, since another stack may be on the same bus."""
     while missing := [each.service for each in started if each.instance not in bus.instances(each.service)]:
         _require_alive(supervisor)
         if missing == ["recorder"] and supervisor.ended():
@@ -147,7 +154,7 @@ def _wait_ready(bus: Bus, started: Iterable[_Service], supervisor: Supervisor, g
 
 
 def _require_alive(supervisor: Supervisor) -> None:
-    """Raise `Unavailable` where a process has ended that planning needs."""
+    """Raise `Unavailable` if a process has ended that planning needs."""
     for name, status in supervisor.ended().items():
         if name != "recorder-1":
             raise Unavailable(f"ended with status {status} before it was ready", where=name)

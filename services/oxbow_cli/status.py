@@ -1,4 +1,4 @@
-"""What runs on a stack, and where its missions stand."""
+"""The processes of a stack, and the state of its missions."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from oxbow_cli.stack import SERVICES
 __all__ = ["Process", "StackStatus", "status_of"]
 
 ANSWER_S = 2.0
-"""How long a process may take to answer; one that is alive and stays silent hangs."""
+"""How long a process may take to answer; one that is alive but silent hangs."""
 
 SEEN_S = 0.5
-"""How long to wait for a service to be seen alive; those that are there are seen in milliseconds."""
+"""How long to wait for a service to be seen alive; running ones are seen in milliseconds."""
 
 T = TypeVar("T", Ping, Stats, Supervision)
 
 
 class Process(msgspec.Struct, frozen=True, kw_only=True):
-    """One process that is seen alive; where it does not hang, with what it tells about itself."""
+    """A process that is seen alive, with what it reports about itself; None if it hangs."""
 
     service: str
     instance: str
@@ -35,9 +35,9 @@ class Process(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class StackStatus(msgspec.Struct, frozen=True, kw_only=True):
-    """The processes of a stack, the services of which there is none, and each mission's latest revision.
+    """The processes of a stack, the services without any, and each mission's latest revision.
 
-    `supervised` are the processes that `oxbow up` keeps running, those that do not run now, too.
+    `supervised` are the processes that `oxbow up` keeps running, including those that are down at the moment.
     """
 
     endpoint: str
@@ -48,7 +48,7 @@ class StackStatus(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def status_of(endpoint: str) -> StackStatus:
-    """Ask all that is alive on the bus at `endpoint`; `Unavailable` where there is no router."""
+    """Ask everything that is alive on the bus at `endpoint`; raises `Unavailable` if there is no router."""
     with Bus.connect(endpoint, timeout_s=ANSWER_S) as bus:
         with suppress(Unavailable):
             bus.wait_ready(SERVICES, SEEN_S)
@@ -80,7 +80,7 @@ def _ask(bus: Bus, what: str, kind: type[T]) -> dict[tuple[str, str], T]:
         return {}
     answers = {}
     for _key, payload in replies:
-        with suppress(msgspec.DecodeError):  # anyone may answer
+        with suppress(msgspec.DecodeError):  # any program on the bus may answer, in any form
             answer = msgspec.json.decode(payload, type=kind)
             answers[answer.stage, answer.instance] = answer
     return answers

@@ -1,4 +1,4 @@
-"""What the command writes to stdout and stderr, whatever these can show."""
+"""Writing to stdout and stderr, whatever characters these can show."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["print_utf8", "tolerate_any_text"]
 
 
 def tolerate_any_text() -> None:
-    """Write what a terminal's encoding has no character for as an escape, in place of an exception."""
+    """Write characters that a terminal's encoding lacks as escapes, instead of raising an exception."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")

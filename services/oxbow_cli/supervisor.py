@@ -1,4 +1,4 @@
-"""Child processes: started at once, started again when they end or do nothing, and stopped without a trace."""
+"""Child processes: started, restarted when they end or hang, and stopped without leaving any behind."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from oxbow.errors import Unavailable
 __all__ = ["Child", "Supervisor"]
 
 GRACE_S = 10.0
-"""How long children may take to end in order; then they are killed."""
+"""How long children may take for an orderly end before they are killed."""
 
 HURRIED_GRACE_S = 0.5
-"""The same after an error or Ctrl-C: what they still do is of no use."""
+"""The same after an error or Ctrl-C, when their work is of no more use."""
 
 _CHECK_S = 0.1
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.2, 5.0
@@ -31,28 +31,28 @@ _log = logging.getLogger(__name__)
 
 
 class Child:
-    """A process, and the ones that take its place when it ends.
+    """A process, and those that replace it when it ends.
 
-    It leads a session of its own, so that Ctrl-C reaches the supervisor alone, which then stops its children
-    in order; and so that whatever it has started itself can be killed with it.
+    It leads a session of its own. So Ctrl-C reaches only the supervisor, which then stops its children in order,
+    and whatever the process has started itself can be killed with it.
 
     Parameters
     ----------
     name
-        What it is called in the log.
+        Its name in the log.
     arguments
-        Those of this Python interpreter.
+        Arguments to this Python interpreter.
     rank
-        Its place in the order of stopping.
+        Its place in the order of stopping; the highest is stopped first.
     output
-        A file descriptor for all that it prints; where absent, this process's stderr.
+        A file descriptor for all that it prints; None for this process's stderr.
 
     Attributes
     ----------
     starts
-        How often it has been started.
+        How many times it has been started.
     trouble
-        Why it does not run; empty while it does.
+        Why it does not run; empty while it runs.
 
     Raises
     ------
@@ -94,15 +94,15 @@ class Child:
         return self.process.poll() is None
 
     def age_s(self) -> float:
-        """How long ago its present process was started."""
+        """How long ago its current process was started."""
         return time.monotonic() - self._started
 
     def revive(self) -> None:
-        """Start it again where it has ended, after a pause that doubles while it keeps ending soon."""
+        """Restart it if it has ended, after a pause that doubles while it keeps ending early."""
         if self.runs():
             return
         if self._start_again is None:
-            self.send(signal.SIGKILL)  # what it had started itself
+            self.send(signal.SIGKILL)  # kills what it had started itself
             if self.age_s() > _SETTLED_S:
                 self._pause_s = _FIRST_PAUSE_S
             self._start_later(f"ended with status {self.process.returncode}")
@@ -129,12 +129,12 @@ class Child:
             os.killpg(self.pid, number)
 
     def terminate(self) -> None:
-        """Ask for an orderly end, of a process that is stopped, too."""
+        """Ask the process for an orderly end, even if it is stopped."""
         self.process.terminate()
         self.send(signal.SIGCONT)
 
     def stop(self, grace_s: float) -> None:
-        """Wait for it to end, for no longer than `grace_s`; then kill it, and whatever it leaves behind."""
+        """Wait at most `grace_s` for it to end; then kill it, and whatever it leaves behind."""
         try:
             with suppress(subprocess.TimeoutExpired):
                 self.process.wait(grace_s)
@@ -146,8 +146,13 @@ class Child:
 class Supervisor:
     """Runs children until it is closed; a context manager.
 
-    Children that should not outlive a supervisor that is killed have to notice its death themselves
+    Children that should not outlive a killed supervisor must notice its death themselves
     (`oxbow.runtime.lifetime`).
+
+    Parameters
+    ----------
+    output
+        A file descriptor for all that children print; None for this process's stderr.
     """
 
     def __init__(self, output: int | None = None) -> None:
@@ -157,7 +162,18 @@ class Supervisor:
         self._threads: list[threading.Thread] = []
 
     def start(self, name: str, arguments: Sequence[str], rank: int) -> Child:
-        """Start a child; those of the highest rank are stopped first."""
+        """Start a child.
+
+        Parameters
+        ----------
+        name, arguments, rank
+            See `Child`.
+
+        Raises
+        ------
+        Unavailable
+            It cannot be started.
+        """
         child = Child(name, arguments, rank, self._output)
         self.children.append(child)
         return child
@@ -167,7 +183,7 @@ class Supervisor:
         return {child.name: child.process.returncode for child in self.children if not child.runs()}
 
     def keep_alive(self) -> None:
-        """From now on, start children again that end."""
+        """From now on, restart children that end."""
         for child in self.children:
             self.repeat(child.revive, _CHECK_S, child.name)
 
@@ -178,7 +194,19 @@ class Supervisor:
         name: str,
         at_end: Callable[[], object] = lambda: None,
     ) -> None:
-        """Call `step` every `period_s` on a thread of its own, whatever it raises, and at last `at_end`."""
+        """Call a function again and again on a thread of its own, until the supervisor is closed.
+
+        Parameters
+        ----------
+        step
+            Called every period; what it raises is logged, and the pauses then grow.
+        period_s
+            The pause between calls.
+        name
+            Of the thread, for the log.
+        at_end
+            Called last, on the same thread.
+        """
 
         def run() -> None:
             try:
@@ -210,9 +238,10 @@ class Supervisor:
         self.close(GRACE_S if error is None else HURRIED_GRACE_S)
 
     def close(self, grace_s: float) -> None:
-        """Stop all children, those that others need to leave in order last."""
+        """Stop all children, by rank; those that others need for an orderly end come last."""
         self._closing.set()
         try:
+            # First, so that no thread restarts a child that has just been stopped.
             for thread in self._threads:
                 thread.join()
             for rank in sorted({child.rank for child in self.children}, reverse=True):

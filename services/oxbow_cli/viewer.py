@@ -1,4 +1,4 @@
-"""Opening a recording: the viewer is a program of its own, and nothing of it is imported here."""
+"""Opening a recording in the viewer, which runs as a program of its own and is not imported."""
 
 from __future__ import annotations
 
@@ -13,13 +13,26 @@ from oxbow.errors import InvalidMission
 __all__ = ["find_recording", "open_recording"]
 
 MOST_NAMED = 20
-"""Recordings that an error names."""
+"""At most this many recordings are named in an error."""
 
 _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
 def find_recording(name: str, folder: Path) -> Path:
-    """The recording of a mission's id, or the file itself where `name` is a path to one."""
+    """The recording of a mission.
+
+    Parameters
+    ----------
+    name
+        A mission's ID, or the path of a recording, which ends in .rrd.
+    folder
+        Where recordings are kept.
+
+    Raises
+    ------
+    InvalidMission
+        There is no such recording, or the name is not an ID; names some that exist.
+    """
     path = Path(name) if name.endswith(".rrd") else folder / f"{checked_id(name, where='ID')}.rrd"
     try:
         if path.is_file():
@@ -33,14 +46,14 @@ def find_recording(name: str, folder: Path) -> Path:
 
 
 def open_recording(path: Path) -> int:
-    """Show a recording in the rerun viewer until it is closed; returns the viewer's exit status.
+    """Show a recording in the rerun viewer until it is closed; return the viewer's exit status.
 
     Without a screen, it only says how to open the recording.
     """
     command = [sys.executable, "-m", "rerun", str(path)]
     print(path)
     if sys.platform != "darwin" and not any(map(os.environ.get, _SCREENS)):
-        print("no screen here; copy the file to where there is one, and open it with: rerun", path.name)
-        print("or serve it to a browser from here with:", *command, "--serve-web")
+        print("no screen; copy the file to a machine with one, and open it with: rerun", path.name)
+        print("or serve it to a browser from this machine with:", *command, "--serve-web")
         return 0
     return subprocess.run(command, check=False).returncode

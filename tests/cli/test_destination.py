@@ -54,7 +54,7 @@ def test_an_edit_made_meanwhile_stays_and_the_plan_is_kept_beside_it(lake, there
     first, second = Destination.of(lake), Destination.of(lake)
     lake.write_bytes(b"edited")
     for destination, name in ((first, "lake.planned.json"), (second, "lake.planned-2.json")):
-        with pytest.raises(InvalidMission, match="changed meanwhile") as caught:
+        with pytest.raises(InvalidMission, match="changed in the meantime") as caught:
             destination.keep(PLAN)
         assert f"kept in {str(lake.with_name(name))!r}" in str(caught.value)
         assert lake.with_name(name).read_bytes() == PLAN
@@ -84,7 +84,7 @@ def test_a_plan_that_fits_nowhere_leaves_nothing_half_written(lake, temporary):
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (4_096, before[1]))
     try:
-        with pytest.raises(InvalidMission, match="File too large; the plan could be kept nowhere"):
+        with pytest.raises(InvalidMission, match="File too large; the plan could not be kept anywhere"):
             destination.keep(b"x" * 10_000)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
@@ -148,6 +148,6 @@ def test_a_mission_that_is_edited_while_it_is_planned_keeps_the_edit(folder, pon
         prior.write('{"type": "FeatureCollection", "features": []}')
     told = command.communicate(timeout=60)[1]
     assert command.returncode == 2
-    assert "pond.json: was changed meanwhile, and is left as it is" in told
+    assert "pond.json: was changed in the meantime, and is left as it is" in told
     assert (folder / "pond.json").read_text() == edited
     assert "Master_Path" in json.loads((folder / "pond.planned.json").read_text())

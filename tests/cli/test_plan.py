@@ -96,7 +96,7 @@ def test_no_time_without_end_or_beginning(oxbow, option, seconds):
         (["--prior", "link.json", "-o", "prior.json"], "prior.json: is 'link.json', too"),
         (["-o", "fifo"], "fifo: cannot be written: is not a regular file"),
         (["-o", "kept.json"], "kept.json: cannot be written: is write-protected"),
-        (["-o", "circle.json"], "circle.json: cannot be written: its symbolic links go round in a circle"),
+        (["-o", "circle.json"], "circle.json: cannot be written: its symbolic links form a loop"),
         (["-o", "pond.json/planned.json"], "does not exist"),
         (["-o", "x" * 300], "File name too long"),
     ],

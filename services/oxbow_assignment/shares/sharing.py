@@ -138,7 +138,7 @@ def _footprint_m(free: Polygon, masters: int, footprint_m: float | None) -> floa
 
 
 def _edge_m(area: Polygon, triangles: int) -> float:
-    """The edge of equilateral triangles of which so many fill the area or, where it is thin, line its border."""
+    """The edge of equilateral triangles that fill an area or, if it is thin, line its border; in metres."""
     return max(math.sqrt(4.0 / math.sqrt(3.0) * area.area / triangles), area.length / triangles)
 
 

@@ -44,7 +44,7 @@ def pseudo_coordinates(distances: FloatArray) -> PseudoCoordinates:
 
     The columns of the cost matrix are the coordinates, as in the report. Under the norm of the largest
     difference this embeds any finite metric space without distortion (M. Fréchet, 1910);
-    `clustering.mean_distances` uses that. The report leaves the norm open; places here are for the Euclidean
+    `clustering.mean_distances` uses that. The report leaves the norm open; these places are for the Euclidean
     norm of k-means, divided by sqrt(n), so that metres do not depend on the number of targets, and turned to
     their principal axes, which changes no distance; axes with next to no spread are left out.
 
