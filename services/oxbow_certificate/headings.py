@@ -51,6 +51,7 @@ def count_turns(path: LineString, reach_m: float) -> int:
         The length of path within which changes add up.
     """
     steps = _steps(path)
+    # Unwrapped, so that changes add up across the cut at +-180 degrees.
     heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
     corner_at = np.cumsum(np.hypot(*steps.T))[:-1]
     return sum(_count_left_turns(side * heading, corner_at, reach_m) for side in (1.0, -1.0))

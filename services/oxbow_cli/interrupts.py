@@ -78,7 +78,7 @@ def _leave(status: int) -> None:
     """End the process, after showing the cursor again, which a progress bar may have hidden."""
     if os.isatty(2):
         os.write(2, _SHOW_CURSOR)
-    os._exit(status)
+    os._exit(status)  # not `sys.exit`, whose exception could be swallowed
 
 
 ending = Ending()

@@ -131,7 +131,7 @@ class Child:
     def terminate(self) -> None:
         """Ask the process for an orderly end, even if it is stopped."""
         self.process.terminate()
-        self.send(signal.SIGCONT)
+        self.send(signal.SIGCONT)  # a stopped process receives SIGTERM only once it continues
 
     def stop(self, grace_s: float) -> None:
         """Wait at most `grace_s` for it to end; then kill it, and whatever it leaves behind."""

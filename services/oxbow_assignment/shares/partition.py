@@ -167,6 +167,7 @@ def balanced_partition(
     for _ in range(SUBDIVISIONS if allowed.all() else 0):
         if _imbalance(mesh, share, capacities) <= BALANCE:
             break
+        # Triangle t becomes 4 t to 4 t + 3.
         mesh, share, allowed = mesh.subdivided(), np.repeat(share, 4), np.repeat(allowed, 4, axis=1)
         share = _balanced(mesh, share, capacities, allowed)
     return Partition.of(mesh, share, capacities)

@@ -112,6 +112,7 @@ def shared(
     within = _within_reach(mesh, reach)
     reach = reach.among(within)
     docks: list[Place] = [(x, y) for x, y in reach.docks.tolist()]
+    # Ways to shares are not known before there are shares: the first ones take what the legs leave.
     partition = balanced_partition(mesh.part(within), docks, reach.lengths_m - reach.legs_m, reach.allowed)
     reach = reach.on(partition.mesh)
     partition = _by_length_left(partition, reach)
@@ -204,5 +205,5 @@ def _uneven(partition: Partition, reach: Reach, masters: Sequence[Vehicle]) -> s
     dense, sparse = (masters[int(which)].name for which in (spacings_m.argmin(), spacings_m.argmax()))
     return (
         f"shares are not even: {dense} can leave {spacings_m.min():.3g} m between its legs, {sparse}"
-        f" {spacings_m.max():.3g} m, for the ways there take the length: start vehicles apart, or give more length"
+        f" {spacings_m.max():.3g} m, since ways there use up length: start vehicles apart, or give more length"
     )

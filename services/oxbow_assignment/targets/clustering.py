@@ -109,7 +109,7 @@ def k_means(
     for _ in range(TURNS):
         squares = _squares(places, centres)
         nearest = squares.argmin(axis=1)
-        _fill_empty(nearest, squares, k)
+        _fill_empty(nearest, squares, k)  # an empty cluster has no centroid
         if (nearest == labels).all():
             break
         labels = nearest

@@ -91,6 +91,7 @@ def _best_apart(kinds: Sequence[_Moves], layout: Layout) -> dict[int, Indices]:
     gains = np.concatenate([moves.gains for moves in kinds])
     origin = np.concatenate([np.full(len(moves.gains), kind) for kind, moves in enumerate(kinds)])
     index = np.concatenate([np.arange(len(moves.gains)) for moves in kinds])
+    # A move that gains no more than rounding might be made and undone forever.
     worth = np.flatnonzero(gains > least)
     changed: dict[int, Indices] = {}
     for best in worth[np.argsort(-gains[worth], kind="stable")].tolist():
@@ -106,6 +107,7 @@ def _relocations(layout: Layout, near: Indices, length: int) -> _Moves:
     at = np.flatnonzero(layout.is_free[: len(rows) - length + 1] & layout.is_free[length - 1 :])
     at = at[layout.tour[at] == layout.tour[at + length - 1]]
     joins = layout.place[np.concatenate([near[rows[at]], near[rows[at + length - 1]]], axis=1)]
+    # The front of every tour, too: a tour without targets has none that could be near.
     fronts = np.broadcast_to(layout.fronts, (len(at), len(layout.fronts)))
     edges = np.concatenate([joins - 1, joins, fronts], axis=1)
     at, edges = np.repeat(at, edges.shape[1]), edges.ravel()

@@ -84,6 +84,7 @@ def exact_path(distances: FloatArray, path: Indices) -> Indices:
         longer = (lengths[sets, :, None] + between).min(axis=1)
         rows, added = np.nonzero((sets[:, None] >> np.arange(n)) & 1 == 0)
         lengths[sets[rows] | (1 << added), added] = longer[rows, added]
+    # Backwards through the table: the last target first, then the best one before it.
     onward, order, left = distances[targets, end], [], (1 << n) - 1
     while left:
         last = int((lengths[left] + onward).argmin())
@@ -177,6 +178,7 @@ def _best_two_opt(local: FloatArray, order: Indices, near: Indices) -> _Move:
     position = np.argsort(order)
     here, there = np.arange(len(order))[:, None], position[near[order]]
     low, high = np.minimum(here, there), np.maximum(here, there)
+    # Two rows can be joined by reversing what lies between them, up to the one or up to the other.
     before = np.stack([low, low - 1]).ravel()
     until = np.stack([high, high - 1]).ravel()
     possible = np.flatnonzero((before >= 0) & (until < len(order) - 1))

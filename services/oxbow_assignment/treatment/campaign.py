@@ -118,7 +118,7 @@ def plan_campaign(
         A slave's range is too short to reach the free space and go home, or it would take hundreds of sorties.
     """
     require_treatable(spots)
-    shapely.prepare(free)
+    shapely.prepare(free)  # thousands of lines are tested against it
     fleet = Fleet.of(slaves, free, free if water is None else water, danger)
     found = tuple(waters(spots, free))
     # Between passes there is next to nothing to choose: the funnel finds the shortest way, and at once.

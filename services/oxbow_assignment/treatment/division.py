@@ -125,6 +125,7 @@ def divided(treatments: Sequence[Treatment], fleet: Fleet) -> Division:
                 access_m = float(fleet.lengths_m[slave] - own[slave])
                 out_of_reach.append(OutOfReach(piece, slave, access_m))
             else:
+                # Far from the docks hardly any range is spare: without a floor, one division would make crumbs.
                 shortest_m = max(float(own[slave]), LEAST_SPARE * float(fleet.lengths_m[slave]))
                 longer += _evenly(piece, max(2, math.ceil(length_m / shortest_m)))
         pieces = longer

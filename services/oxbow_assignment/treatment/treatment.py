@@ -83,6 +83,7 @@ def treatment_of(spot: HotSpot, water: BaseGeometry, free: Polygon, router: Rout
         The swath is so small that the hot spot would take thousands of passes.
     """
     _require_few(passes_needed(water, swath_m), spot, swath_m)
+    # In a hot spot of thin pieces the middle of every band may be land: then each piece gets passes of its own.
     more = parallel_passes(water, free, swath_m) or _further_passes(Polygon(), water, free, swath_m)
     _require_few(len(more), spot, swath_m)
     passes: list[LineString] = []

@@ -116,6 +116,7 @@ class Triangulation:
         mesh = self
         while len(places):
             holder = mesh.located(places)
+            # By rounding, a place beside the border may come to lie outside.
             places, holder = places[holder >= 0], holder[holder >= 0]
             if len(places) == 0:
                 break
