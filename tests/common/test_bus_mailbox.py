@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import itertools
+import sys
 import threading
 
 from oxbow.bus.mailbox import Mailbox
@@ -55,3 +57,26 @@ def test_a_mailbox_may_be_closed_by_its_own_delivery() -> None:
     mailbox = Mailbox("test", deliver, size=1)
     mailbox.offer(1)
     assert closed.wait(20.0)
+
+
+def test_what_is_accepted_beside_the_close_is_delivered() -> None:
+    interval_s = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        for _ in range(150):
+            delivered: list[int] = []
+            mailbox = Mailbox("test", delivered.append, size=10_000)
+            accepted: list[int] = []
+
+            def offer(mailbox: Mailbox[int] = mailbox, accepted: list[int] = accepted) -> None:
+                accepted.extend(itertools.takewhile(mailbox.offer, range(10_000)))
+
+            offering = [threading.Thread(target=offer) for _ in range(3)]
+            for thread in offering:
+                thread.start()
+            mailbox.close()
+            for thread in offering:
+                thread.join()
+            assert sorted(delivered) == sorted(accepted)
+    finally:
+        sys.setswitchinterval(interval_s)

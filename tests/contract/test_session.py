@@ -175,11 +175,11 @@ def test_an_endpoint_without_a_protocol_is_refused() -> None:
 
 def test_ctrl_c_ends_a_program_that_waits_for_the_router() -> None:
     program = run_python(
-        "from oxbow.bus import Bus; print('on', flush=True); Bus.connect('tcp/127.0.0.1:9', timeout_s=60)"
+        "from oxbow.bus.client import Bus; print('on', flush=True); Bus.connect('tcp/127.0.0.1:9', timeout_s=60)"
     )
     assert program.stdout is not None
     with program.stdout:
-        program.stdout.readline()
+        assert program.stdout.readline().strip() == b"on"
         time.sleep(0.2)
         program.send_signal(signal.SIGINT)
         assert program.wait(10.0) != 0
@@ -187,7 +187,7 @@ def test_ctrl_c_ends_a_program_that_waits_for_the_router() -> None:
 
 def test_a_program_that_never_closes_its_bus_still_ends(router: RouterProcess, bus: Bus) -> None:
     program = run_python(
-        "import sys, time; from oxbow.bus import Bus\n"
+        "import sys, time; from oxbow.bus.client import Bus\n"
         "bus = Bus.connect(sys.argv[1])\n"
         "bus.subscribe('test/**', lambda key, payload: None); bus.answer('test/x', lambda *query: [])\n"
         "bus.declare_live('oxbow/v1/live/forgetful/one'); time.sleep(0.5)",

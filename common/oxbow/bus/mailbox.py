@@ -34,6 +34,7 @@ class Mailbox(Generic[T]):
         self._deliver = deliver
         self._items: queue.Queue[T | None] = queue.Queue(size)
         self._closed = threading.Event()
+        self._door = threading.Lock()
         # Daemons: a program that forgets to close its bus must still be able to end.
         self._threads = [
             threading.Thread(target=self._run, name=f"{name}-{i}", daemon=True) for i in range(workers)
@@ -43,22 +44,25 @@ class Mailbox(Generic[T]):
 
     def offer(self, item: T) -> bool:
         """Queue an item without waiting; False where there is no room or the mailbox is closed."""
-        if self._closed.is_set():
-            return False
-        try:
-            self._items.put_nowait(item)
-        except queue.Full:
-            return False
-        return True
+        # An item that came between the last look and the marks of the end would lie behind these for ever.
+        with self._door:
+            if self._closed.is_set():
+                return False
+            try:
+                self._items.put_nowait(item)
+            except queue.Full:
+                return False
+            return True
 
     def __len__(self) -> int:
         return self._items.qsize()
 
     def close(self) -> None:
         """Accept nothing more, deliver what waits, and end the threads."""
-        if self._closed.is_set():
-            return
-        self._closed.set()
+        with self._door:
+            if self._closed.is_set():
+                return
+            self._closed.set()
         # Behind all that waits: a thread that takes the mark ends when that has been delivered.
         for _ in self._threads:
             self._items.put(None)

@@ -42,7 +42,7 @@ from oxbow.geometry.conformance import Shore, strays
 from oxbow.geometry.frame import Frame
 from oxbow.geometry.sweep import from_sweep
 from oxbow.site.fleet import VehiclePlan
-from oxbow.tolerances import ROUNDING_M
+from oxbow.tolerances import DISTANCE_ROUNDING, ROUNDING_M
 from oxbow.wire import codec
 
 __all__ = ["CheckedCall", "require_faultless", "require_fit_to_follow"]
@@ -187,7 +187,7 @@ def _way_faults(path: LineString, start: Place, end: Place, length_m: float) -> 
     off_m = np.hypot(*(shapely.get_coordinates(path)[[0, -1]] - np.array([start, end])).T)
     if off_m.max() > EXACT_M:
         yield f"a path begins {off_m[0]:.3g} m from its start and ends {off_m[1]:.3g} m from its recovery"
-    if path.length > length_m * (1.0 + ROUNDING_M):
+    if path.length > length_m * (1.0 + DISTANCE_ROUNDING):
         yield f"a path is {path.length:.1f} m long, of {length_m:.1f} m"
 
 

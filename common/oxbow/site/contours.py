@@ -68,7 +68,8 @@ class Contour:
         if not np.isfinite(xy).all():
             raise InvalidMission("reaches to the other side of the Earth", where=self.name)
         hull = shapely.convex_hull(LineString(xy))
-        if hull.area < LEAST_WIDTH_M * hull.length:
+        # Both long sides of a strip are in its hull's perimeter.
+        if hull.area < LEAST_WIDTH_M * hull.length / 2:
             if len(np.unique(self.degrees, axis=0)) < 3:
                 raise _too_few(self.name, self.degrees)
             raise InvalidMission(
