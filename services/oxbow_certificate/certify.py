@@ -39,7 +39,19 @@ class Judgement:
 
 
 def certify(request: CertifyRequest) -> Certificate:
-    """The certificate of a path, or of several; see `judge`."""
+    """The certificate of a path, or of several; see `judge`.
+
+    Examples
+    --------
+    One straight leg through the middle of a square: nothing is farther from it than the shore.
+
+    >>> from shapely import LineString, box
+    >>> leg = LineString([(0, 50), (100, 50)])
+    >>> request = CertifyRequest(outline=box(0, 0, 100, 100), path=leg, launch=(0, 50), recovery=(100, 50))
+    >>> certificate = certify(request)
+    >>> certificate.crossings, certificate.outside_m, certificate.cover_radius_m[0]
+    (0, 0.0, 50.0)
+    """
     return judge(request).certificate
 
 

@@ -7,6 +7,8 @@ import pytest
 
 MODULES = [
     "oxbow.geometry.route",
+    "oxbow.planning.pipeline",
+    "oxbow_certificate.certify",
 ]
 
 
