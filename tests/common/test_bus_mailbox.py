@@ -63,7 +63,7 @@ def test_what_is_accepted_beside_the_close_is_delivered() -> None:
     interval_s = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)
     try:
-        for _ in range(150):
+        for _ in range(60):
             delivered: list[int] = []
             mailbox = Mailbox("test", delivered.append, size=10_000)
             accepted: list[int] = []
