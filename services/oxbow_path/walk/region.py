@@ -24,9 +24,12 @@ __all__ = ["Brush", "Circuit", "Walk", "clear_of_land", "dilated", "largest", "s
 CORE = 0.5
 """Half width of a band in narrows, as a share of its half width in the open."""
 
+MANY_CORNERS = 1_000
+"""Lines of more corners are simplified before they are dilated: ways along narrow channels have so many that GEOS
+would take minutes."""
+
 DETAIL = 0.01
-"""How far a line may be off before it is dilated, as a share of the half width: ways along narrow channels have so
-many corners that GEOS would take minutes."""
+"""How far such a line may be off then, as a share of the half width."""
 
 LEAST_LINE_M = 1e-9
 """Shorter lines have no direction to be dilated across."""
@@ -110,11 +113,13 @@ class Brush:
 
 
 def _dilations(lines: Sequence[LineString], width_m: float, *, flat: bool) -> list[BaseGeometry]:
-    directed = [line for line in lines if line.length > LEAST_LINE_M]
+    directed = np.array([line for line in lines if line.length > LEAST_LINE_M], dtype=object)
+    many = shapely.get_num_coordinates(directed) > MANY_CORNERS
+    directed[many] = shapely.simplify(directed[many], DETAIL * width_m)
     # GEOS raises the flags of a division by zero where it mitres parallel segments, and then copes with it.
     with np.errstate(divide="ignore", invalid="ignore"):
         dilations = shapely.buffer(
-            shapely.simplify(directed, DETAIL * width_m),
+            directed,
             width_m,
             cap_style="flat" if flat else "square",
             join_style="mitre",
