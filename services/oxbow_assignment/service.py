@@ -49,6 +49,7 @@ def handle(request: AssignRequest, show: Show) -> Assignment:
         request.swath_m,
         water=request.water,
         danger=danger,
+        router=request.router,
         seed=request.seed,
     )
     first, *others = campaign.schedule.rounds or ((),)

@@ -104,6 +104,13 @@ def plan(
     draw: Annotated[
         str, typer.Option(help="How SpaceFillingCurve draws its inputs: low-discrepancy or convex-combination.")
     ] = "low-discrepancy",
+    router: Annotated[
+        str,
+        typer.Option(
+            help="How slaves' ways between hot spots are found: visibility (the shortest), funnel (the quickest to"
+            " plan), tessellation, or incenters (well off the shore)."
+        ),
+    ] = "visibility",
     timeout: Annotated[
         float, typer.Option(metavar="S", help="Give up after this many seconds; at most a day.")
     ] = 300.0,
@@ -144,7 +151,13 @@ def plan(
             record.parent.mkdir(parents=True, exist_ok=True)
         Destination.of(record, inputs=[file, completed.path, prior])
     options = plan_options(
-        method, seed=seed, heading_deg=heading, time_limit_s=time_limit, smooth=smooth, draw=draw
+        method,
+        seed=seed,
+        heading_deg=heading,
+        time_limit_s=time_limit,
+        smooth=smooth,
+        draw=draw,
+        router=router,
     )
     with report.progress_bar(shown=not json) as progress:
         job = PlanningJob(

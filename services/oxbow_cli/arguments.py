@@ -13,7 +13,7 @@ from typing import TypeVar
 import msgspec
 
 from oxbow.bus.config import require_endpoint
-from oxbow.contracts import MOST_DEADLINE_S, Draw, Method
+from oxbow.contracts import MOST_DEADLINE_S, Draw, Method, RouteMethod
 from oxbow.errors import InvalidMission, OxbowError, renamed
 from oxbow.geometry.frame import Position
 from oxbow.mission.file import Mission, read_mission
@@ -80,7 +80,14 @@ def position(text: str, where: str) -> Position:
 
 
 def plan_options(
-    method: str, *, seed: int, heading_deg: float | None, time_limit_s: float | None, smooth: bool, draw: str
+    method: str,
+    *,
+    seed: int,
+    heading_deg: float | None,
+    time_limit_s: float | None,
+    smooth: bool,
+    draw: str,
+    router: str,
 ) -> PlanOptions:
     """The options of a plan.
 
@@ -98,6 +105,8 @@ def plan_options(
         Whether corners are rounded.
     draw
         The name of a `Draw`.
+    router
+        The name of a `RouteMethod`.
 
     Raises
     ------
@@ -113,6 +122,7 @@ def plan_options(
         time_limit_s=time_limit_s,
         smooth=smooth,
         draw=_one_of(Draw, draw, "--draw"),
+        router=_one_of(RouteMethod, router, "--router"),
     )
 
 

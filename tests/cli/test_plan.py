@@ -51,6 +51,7 @@ def test_writes_elsewhere_when_asked(oxbow, folder):
         ({"MissionType": "treat"}, [], 2, ["PriorModel", "treat"]),
         ({}, ["--timeout", "0.01"], 4, ["--timeout"]),
         ({}, ["--method", "Spiral"], 2, ["--method", "Spiral", "Transect"]),
+        ({}, ["--router", "compass"], 2, ["--router", "compass", "incenters"]),
         ({}, ["--prior", "prior.json"], 2, ["prior.json"]),
         ({}, ["--connect", "tcp/127.0.0.1:7447"], 2, ["--local", "--connect"]),
         ({}, ["--record", "pond.rrd"], 2, ["--record"]),

@@ -9,7 +9,7 @@ import pytest
 import shapely
 from shapely import LineString
 
-from oxbow.contracts import ASSIGN, Method, Role
+from oxbow.contracts import ASSIGN, Method, Role, RouteMethod
 from oxbow.errors import Infeasible
 from oxbow.geometry.frame import lonlat
 from oxbow.mission.file import MissionType, mission_json, parse_mission
@@ -163,6 +163,19 @@ def test_a_slave_treats_what_it_can_and_the_rest_is_proposed():
     assert completed.plan.certificate.cover_radius_m[0] < 8.0
     (slave,) = completed.plan.fleet.vehicles
     assert set(slave.hot_spots) == {each.hot_spot for each in treatment.hot_spots}
+
+
+def test_every_router_finds_sorties_and_is_the_one_that_is_used():
+    given, lengths_m = mission("treat", Slave_length=4_000.0), {}
+    for router in RouteMethod:
+        completed, _ = planned(given, PlanOptions(router=router))
+        treatment = completed.plan.treatment
+        assert treatment.router is router
+        assert all(each.treated_share >= 0.99 for each in treatment.hot_spots)
+        lengths_m[router] = completed.plan.length_m
+    shortest_m = lengths_m.pop(RouteMethod.VISIBILITY)
+    assert all(length_m > shortest_m + 0.1 for length_m in lengths_m.values())
+    assert max(lengths_m, key=lengths_m.get) is RouteMethod.INCENTERS
 
 
 def test_a_short_range_leaves_hot_spots_to_further_sorties_or_names_them():

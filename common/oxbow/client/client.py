@@ -27,6 +27,7 @@ from oxbow.contracts import (
     Method,
     MissionKey,
     MissionStatus,
+    RouteMethod,
     checked_id,
     live_key,
     mission_key,
@@ -57,6 +58,7 @@ class Options(TypedDict, total=False):
     time_limit_s: float | None
     smooth: bool
     draw: Draw
+    router: RouteMethod
 
 
 class Client(Closing):

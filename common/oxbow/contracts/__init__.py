@@ -56,6 +56,7 @@ from oxbow.contracts.message import (
 )
 from oxbow.contracts.missions import DEFAULT_DEADLINE_S, MOST_DEADLINE_S, MissionState, MissionStatus
 from oxbow.contracts.path import Draw, Method, PathPlan, PathRequest, SpacingStep, WeightedArea
+from oxbow.contracts.route import RouteMethod
 from oxbow.contracts.stages import (
     ASSIGN,
     CERTIFY,
@@ -119,6 +120,7 @@ __all__ = [
     "PathRequest",
     "Per",
     "Role",
+    "RouteMethod",
     "Rule",
     "Share",
     "Sortie",

@@ -21,6 +21,7 @@ from oxbow.contracts.message import (
     require_line,
     require_place,
 )
+from oxbow.contracts.route import RouteMethod
 from oxbow.errors import InvalidMission, renamed
 from oxbow.tolerances import FARTHEST_M
 
@@ -124,6 +125,8 @@ class AssignRequest(Message, frozen=True, kw_only=True):
         What the slaves' routes avoid, as far as the detour is worth it.
     danger_detour_m
         The detour that raising the chance of no harm by a factor of e is worth.
+    router
+        How the slaves' routes to, between and from hot spots are found.
     seed
         Seed of the random start of clustering.
     """
@@ -137,6 +140,7 @@ class AssignRequest(Message, frozen=True, kw_only=True):
     swath_m: float | None = None
     danger_zones: tuple[DangerZone, ...] = ()
     danger_detour_m: float = DANGER_DETOUR_M
+    router: RouteMethod = RouteMethod.VISIBILITY
     seed: int = 0
 
     def __post_init__(self) -> None:

@@ -12,6 +12,7 @@ from oxbow.contracts import (
     Message,
     Method,
     Role,
+    RouteMethod,
     require_finite,
 )
 from oxbow.geometry.frame import Position
@@ -34,7 +35,8 @@ class PlanOptions(Message, frozen=True, kw_only=True):
 
     `time_limit_s` is how long the path method may spend on improving the path. By default it does a fixed amount
     of work, so that the same request gives the same plan on every machine; with a limit it stops earlier, and
-    the plan depends on the machine. `smooth` asks for rounded corners; `draw` matters to the space-filling curve.
+    the plan depends on the machine. `smooth` asks for rounded corners; `draw` matters to the space-filling curve,
+    and `router` to treatments: it is how routes to, between and from hot spots are found.
     """
 
     method: Method = Method.SPACE_FILLING_CURVE
@@ -44,6 +46,7 @@ class PlanOptions(Message, frozen=True, kw_only=True):
     time_limit_s: float | None = None
     smooth: bool = False
     draw: Draw = Draw.LOW_DISCREPANCY
+    router: RouteMethod = RouteMethod.VISIBILITY
 
     def __post_init__(self) -> None:
         require_finite(self, "heading_rad")
@@ -116,13 +119,17 @@ class FurtherSortie(Message, frozen=True, kw_only=True):
 
 
 class TreatmentRecord(Message, frozen=True, kw_only=True):
-    """Which hot spots are treated, which are left for further sorties, and which no sortie can treat, and why."""
+    """Which hot spots are treated, which are left for further sorties, and which no sortie can treat, and why.
+
+    `router` is how routes to, between and from hot spots were found.
+    """
 
     swath_m: float
     hot_spots: tuple[TreatedSpot, ...]
     further: tuple[FurtherSortie, ...] = ()
     left: tuple[LeftSpot, ...] = ()
     joint_gap: float | None = None
+    router: RouteMethod = RouteMethod.VISIBILITY
 
 
 class PlanRecord(Message, frozen=True, kw_only=True):

@@ -85,7 +85,7 @@ def completed(
         ),
         versions=_versions(),
         fleet=_fleet(teams, written),
-        treatment=_treatment(mission, site, teams[-1]),
+        treatment=_treatment(mission, options, site, teams[-1]),
         slave_certificate=_in_degrees(teams[-1].certificate, site.frame) if len(teams) > 1 else None,
     )
     return msgspec.structs.replace(mission, **_paths(mission, written), plan=record)
@@ -209,7 +209,7 @@ def _vehicle(written: _Written, certificate: Conformance) -> VehicleRecord:
     )
 
 
-def _treatment(mission: Mission, site: Site, team: TeamPlan) -> TreatmentRecord | None:
+def _treatment(mission: Mission, options: PlanOptions, site: Site, team: TeamPlan) -> TreatmentRecord | None:
     assignment = team.assignment
     if assignment is None or not assignment.sorties:
         return None
@@ -233,6 +233,7 @@ def _treatment(mission: Mission, site: Site, team: TeamPlan) -> TreatmentRecord 
         further=further,
         left=assignment.left,
         joint_gap=assignment.joint_gap,
+        router=options.router,
     )
 
 

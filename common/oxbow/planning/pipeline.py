@@ -172,6 +172,7 @@ def treatment(task: MissionTask) -> TeamPlan:
         swath_m=task.mission.treated_swath_m,
         danger_zones=task.site.danger_zones,
         danger_detour_m=task.site.danger_detour_m,
+        router=task.options.router,
         seed=task.options.seed,
     )
     with renamed({"swath_m": "Swath" if task.mission.swath_m else "Minimal_spatial_rate"}):

@@ -89,6 +89,7 @@ def plan_campaign(
     *,
     water: Polygon | None = None,
     danger: Danger = NO_DANGER,
+    router: RouteMethod = RouteMethod.VISIBILITY,
     seed: int = 0,
 ) -> Campaign:
     """Plan the treatment of hot spots (Rendas and Li 2016, introduction).
@@ -107,6 +108,8 @@ def plan_campaign(
         What legs to and from the free space may cross; by default the free space alone.
     danger
         What routes to, between and from hot spots avoid; passes over a hot spot do not.
+    router
+        How these routes are found.
     seed
         Seed of the clustering.
 
@@ -119,7 +122,7 @@ def plan_campaign(
     """
     require_treatable(spots)
     shapely.prepare(free)  # thousands of lines are tested against it
-    fleet = Fleet.of(slaves, free, free if water is None else water, danger)
+    fleet = Fleet.of(slaves, free, free if water is None else water, danger, router)
     found = tuple(waters(spots, free))
     # Between passes there is next to nothing to choose: the funnel finds the shortest way, and at once.
     between_passes = make_router(RouteMethod.FUNNEL, free)

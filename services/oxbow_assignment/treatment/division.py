@@ -86,8 +86,8 @@ def divided(treatments: Sequence[Treatment], fleet: Fleet) -> Division:
     A part fits if its length and the way to it and home are within range, on average over both directions. One
     that does not fit is divided evenly into as many parts as its distance asks for, and these again where needed.
     Along a line, the way there and home changes by no more than twice what is travelled. Where even that leaves
-    nothing within reach, nothing is divided further. Where routes avoid danger, that way may change by more, so
-    short stretches are tried as well.
+    nothing within reach, nothing is divided further. Where routes avoid danger, or are not the shortest, that
+    way may change by more, so short stretches are tried as well.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def divided(treatments: Sequence[Treatment], fleet: Fleet) -> Division:
         longer: list[Part] = []
         for piece, length_m, own in zip(pieces, ways.lengths_m.tolist(), spare.T, strict=True):
             slave = int(own.argmax())
-            is_far = own[slave] + length_m < 0.0 and not fleet.danger.outlines
+            is_far = own[slave] + length_m < 0.0 and fleet.finds_shortest
             if length_m <= own[slave]:
                 parts.append(piece)
             elif is_far or length_m <= LEAST_PART * fleet.lengths_m[slave]:

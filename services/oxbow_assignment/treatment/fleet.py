@@ -115,6 +115,8 @@ class Fleet:
         What their legs may cross.
     danger
         Danger in the free space, for a vehicle of factor 1.
+    method
+        How routes through the free space are found.
     out, home
         A leg for each slave: from its start to the free space, and from there to its recovery (`way_to`); of
         length 0 if the point lies in the free space.
@@ -124,11 +126,19 @@ class Fleet:
     free: Polygon
     water: Polygon
     danger: Danger
+    method: RouteMethod
     out: tuple[LineString, ...]
     home: tuple[LineString, ...]
 
     @classmethod
-    def of(cls, slaves: Sequence[Vehicle], free: Polygon, water: Polygon, danger: Danger = NO_DANGER) -> Fleet:
+    def of(
+        cls,
+        slaves: Sequence[Vehicle],
+        free: Polygon,
+        water: Polygon,
+        danger: Danger = NO_DANGER,
+        method: RouteMethod = RouteMethod.VISIBILITY,
+    ) -> Fleet:
         """The slaves and their legs.
 
         Parameters
@@ -141,6 +151,8 @@ class Fleet:
             What their legs may cross.
         danger
             What routes through the free space avoid.
+        method
+            How they are found.
 
         Raises
         ------
@@ -161,7 +173,7 @@ class Fleet:
                     f" expected less than the vehicle's {slave.length_m:.0f} m in all",
                     where=f"vehicle {slave.name!r}: start",
                 )
-        return cls(tuple(slaves), free, water, danger, out, home)
+        return cls(tuple(slaves), free, water, danger, method, out, home)
 
     @cached_property
     def cautious_slaves(self) -> tuple[Vehicle, ...]:
@@ -172,6 +184,11 @@ class Fleet:
     def lengths_m(self) -> FloatArray:
         """The range that a single part may use of each slave, in metres, shape (v,): again a little less."""
         return np.array([slave.length_m * (1.0 - MARGIN) for slave in self.cautious_slaves])
+
+    @property
+    def finds_shortest(self) -> bool:
+        """Whether routes are the shortest there are, so that no detour over a third place is shorter."""
+        return self.method is RouteMethod.VISIBILITY and not self.danger.outlines
 
     @cached_property
     def _legs_m(self) -> FloatArray:
@@ -241,5 +258,5 @@ class Fleet:
     def _router(self, factor: float) -> Router:
         if factor not in self._routers:
             danger = replace(self.danger, a=factor)
-            self._routers[factor] = router_on(self._mesh, RouteMethod.VISIBILITY, danger)
+            self._routers[factor] = router_on(self._mesh, self.method, danger)
         return self._routers[factor]

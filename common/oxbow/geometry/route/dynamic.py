@@ -1,7 +1,8 @@
 """Routes among obstacles that appear, move and disappear.
 
 M. Innocenti, L. Pollini and A. Bracci (2006), section 2.4.1, step b: at every time step the triangulation changes
-where obstacles moved, and nowhere else (`oxbow.geometry.route.retriangulation`).
+where obstacles moved, and nowhere else (`oxbow.geometry.route.retriangulation`). No mission uses this
+yet: it is for replans on the way.
 """
 
 from __future__ import annotations

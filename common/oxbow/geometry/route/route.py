@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,19 +12,11 @@ import numpy.typing as npt
 from shapely import LineString
 
 from oxbow.arrays import FloatArray
+from oxbow.contracts.route import RouteMethod
 from oxbow.geometry.route.danger import Danger
 from oxbow.geometry.route.mesh import WaterMesh
 
 __all__ = ["Route", "RouteMethod", "RouteTable", "Router", "judged"]
-
-
-class RouteMethod(enum.StrEnum):
-    """A way to find routes."""
-
-    VISIBILITY = "visibility"
-    TESSELLATION = "tessellation"
-    FUNNEL = "funnel"
-    INCENTERS = "incenters"
 
 
 @dataclass(frozen=True)
