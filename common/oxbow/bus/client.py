@@ -52,6 +52,7 @@ class Bus(Session):
     def __init__(self, session: zenoh.Session, endpoint: str) -> None:
         super().__init__(session, endpoint)
         self.replicas = Replicas(MOST_OUTSTANDING)
+        # For all stages at once: which of them a caller will ask is not known yet, and tokens are few.
         self._watch_liveness(ANY_LIVE, self._on_liveness)
 
     def _on_liveness(self, key: str, alive: bool) -> None:
@@ -140,6 +141,7 @@ class Bus(Session):
     def _asked(
         self, endpoint: Endpoint[Any, Any], payload: bytes, envelope: Envelope, read: Callable[[bytes], A]
     ) -> A:
+        # Refused before it is sent: the replica would only refuse it after megabytes have crossed the network.
         if len(payload) > MAX_REQUEST_BYTES:
             raise InvalidMission(f"is {len(payload)} bytes; at most {MAX_REQUEST_BYTES}", where=endpoint.stage)
         return _Attempts(self, endpoint, payload, envelope, read).run()
@@ -208,6 +210,8 @@ class _Attempts(Generic[A]):
         self.payload = payload
         self.envelope = envelope
         self.read = read
+        # Once for all attempts: a retry keeps its id, by which a replica recognizes a request that it has
+        # answered.
         self.attachment = msgspec.json.encode(envelope)
         self.started = time.monotonic()
         self.tried: dict[str, str] = {}
@@ -230,6 +234,8 @@ class _Attempts(Generic[A]):
                 self._note_failure(instance, error)
             finally:
                 replicas.release(stage, instance)
+            # Only after an attempt has failed; `finally` has released the replica, for other threads of this
+            # caller too.
             self._pause()
 
     def _next_instance(self) -> str:
@@ -244,6 +250,7 @@ class _Attempts(Generic[A]):
 
     def _ask(self, instance: str) -> A:
         key = self.endpoint.instance_key(instance)
+        # Longer than the deadline, so that the stage itself reports where the time went.
         timeout_s = max(0.0, self.envelope.remaining_s()) + REPLY_GRACE_S
         # The key is that of one replica: the first reply is the only one.
         for reply in self.bus._get(key, self.payload, attachment=self.attachment, timeout_s=timeout_s):
@@ -295,6 +302,7 @@ class _Attempts(Generic[A]):
 
         One that gave a wrong answer is asked again only where there is no other.
         """
+        # A replica that has just come up counts too: it was not tried yet.
         if set(self.bus.instances(self.endpoint.stage)) - self.to_avoid:
             return
         self.to_avoid = set(self.false)

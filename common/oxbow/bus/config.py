@@ -36,6 +36,11 @@ def client_config(endpoint: str, timeout_s: float) -> zenoh.Config:
     timeout_s
         Seconds to try for the first connection.
 
+    Returns
+    -------
+    zenoh.Config
+        For `zenoh.open`, which may change it: one for each session.
+
     Raises
     ------
     InvalidMission

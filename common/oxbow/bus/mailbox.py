@@ -65,6 +65,8 @@ class Mailbox(Generic[T]):
             self._closed.set()
         # Behind all that waits: a thread that takes the mark ends when that has been delivered.
         for _ in self._threads:
+            # May block while the queue is full, until its threads have made room; outside the lock, so that
+            # `offer` can refuse.
             self._items.put(None)
         for thread in self._threads:
             if thread is not threading.current_thread():  # an item may close its own mailbox

@@ -72,4 +72,5 @@ class Query:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        # Zenoh ends a query when its object is collected, which is too late for the asker, who waits for it.
         self._query.drop()

@@ -58,6 +58,7 @@ class Replicas:
         with self._changed:
             if self._alive[stage]:
                 return 0.0
+            # Since this object was made, for a stage that was never seen: it may only be starting.
             return time.monotonic() - self._missing_since.get(stage, self._started)
 
     def wait_alive(self, stages: Collection[str], timeout_s: float) -> tuple[str, ...]:
@@ -96,6 +97,7 @@ class Replicas:
         str or None
             The replica's name; None where none had room in time.
         """
+        # A wait may be ended by changes at other stages; what remains of it is computed anew each time.
         give_up = time.monotonic() + timeout_s
         with self._changed:
             while (instance := self._best(stage, avoid)) is None:
@@ -121,6 +123,8 @@ class Replicas:
         alive = self._alive[stage]
         # Where all live ones are to be avoided, one of them is better than none.
         candidates = [
+            # Never asked (-1) before longest ago; the name last, so that the choice does not depend on the order
+            # of a set.
             (self._outstanding[stage, instance], self._asked.get((stage, instance), -1), instance)
             for instance in (alive - set(avoid)) or alive
             if self._outstanding[stage, instance] < self.most_outstanding

@@ -56,11 +56,13 @@ def start_router(listen: str = "tcp/127.0.0.1:0", *, timeout_s: float = 5.0) -> 
     Unavailable
         It could not listen there; it says why on stderr.
     """
+    # A pipe rather than a look at the port: with port 0 only the router knows which one it has got.
     read_fd, write_fd = os.pipe()
     command = [sys.executable, "-m", __name__, "--listen", listen, "--ready-fd", str(write_fd)]
     process = subprocess.Popen([*command, "--parent", str(os.getpid())], pass_fds=[write_fd], stdout=2)
     os.close(write_fd)  # else the end of the router would not be seen as the end of the pipe
     with os.fdopen(read_fd, "rb") as ready:
+        # Readable also where the router has ended: `readline` then returns nothing, at once.
         arrived, _, _ = select.select([ready], [], [], timeout_s)
         endpoint = ready.readline().decode().strip() if arrived else ""
     if not endpoint:
@@ -91,6 +93,7 @@ def run_router(listen: str, lifetime: Lifetime, ready_fd: int | None = None) -> 
     with session:
         _log.info("router listens on %s", endpoint)
         if ready_fd is not None:
+            # A starter that no longer waits is no reason not to route.
             with os.fdopen(ready_fd, "w") as ready, contextlib.suppress(BrokenPipeError):
                 ready.write(endpoint + "\n")
         lifetime.wait()

@@ -85,6 +85,11 @@ class Session(Closing):
         timeout_s
             Seconds to wait for it.
 
+        Returns
+        -------
+        Self
+            An open session; it joins again by itself when the router comes back.
+
         Raises
         ------
         InvalidMission
@@ -133,6 +138,8 @@ class Session(Closing):
         """Leave the bus: no longer alive, then nothing more received, then what was received is dealt with."""
         if self._session.is_closed():
             return
+        # The order matters: first nobody new asks, then what has been accepted is answered, and only then the
+        # link goes.
         for key in tuple(self._tokens):
             self.undeclare_live(key)
         for subscription in self._subscriptions:
@@ -211,6 +218,7 @@ class Session(Closing):
                 _log.warning("%s: the queue of %d is full; a sample is lost", sample.key_expr, queue_size)
 
         require_key(key_expr)
+        # The mailbox first: samples may arrive before the declaration returns.
         declared = self._session.declare_subscriber(key_expr, Callback(accept, indirect=False))
         return self._keep(Subscription([declared], mailbox))
 
@@ -335,6 +343,7 @@ class Session(Closing):
                 found.append((str(reply.ok.key_expr), reply.ok.payload.to_bytes()))
             elif reply.err is not None:
                 failure = error_of(reply.err, selector, timeout_s)
+        # Of many answerers some may fail; what the others replied is still of use.
         if failure is not None and not (all_targets and found):
             raise failure
         if not found and not may_be_empty:
@@ -349,6 +358,7 @@ class Session(Closing):
     def declare_live(self, key: str) -> None:
         """Be seen alive under `key` until `undeclare_live`, `close`, or the death of this process."""
         require_key(key)
+        # Kept, since a token is withdrawn when its object is collected.
         self._tokens[key] = self._session.liveliness().declare_token(key)
 
     def undeclare_live(self, key: str) -> None:
@@ -408,11 +418,14 @@ class Session(Closing):
 
     def _give_up_asking(self) -> None:
         """End what was asked before the link was lost: zenoh forgets queries that leave at that very moment."""
+        # A copy: other threads ask, and end asking, meanwhile.
         for cancellation in tuple(self._asking):
             cancellation.cancel()
 
     def _keep(self, subscription: Subscription) -> Subscription:
         with self._lock:
+            # Closed ones are dropped at this occasion, or a client that follows plan after plan would collect
+            # them.
             self._subscriptions = [kept for kept in self._subscriptions if not kept.closed] + [subscription]
         return subscription
 
@@ -425,6 +438,7 @@ def require_key(key: str) -> None:
     InvalidMission
         It is longer than `MOST_KEY_BYTES`, or is not Unicode.
     """
+    # A lone surrogate cannot be encoded: let through to be counted, and refused below with a message.
     size = len(key.encode(errors="surrogatepass"))
     if size > MOST_KEY_BYTES or any("\ud800" <= character <= "\udfff" for character in key):
         raise InvalidMission(
@@ -443,6 +457,11 @@ def error_of(reply: zenoh.ReplyError, selector: str, timeout_s: float) -> OxbowE
         What was asked, for errors.
     timeout_s
         How many seconds the answer was waited for, for errors.
+
+    Returns
+    -------
+    OxbowError
+        To be raised by the caller; `DeadlineExceeded` for zenoh's own time-out.
     """
     if is_timeout(reply):
         return DeadlineExceeded(f"no answer within {timeout_s:.1f} s", where=selector)
@@ -463,6 +482,11 @@ def told_error(reply: zenoh.ReplyError, selector: str) -> StageError:
         An error in JSON.
     selector
         What was asked, which is where an unreadable error is said to have happened.
+
+    Returns
+    -------
+    StageError
+        With the code `internal` where the reply was no such error.
     """
     try:
         return decode_json(reply.payload.to_bytes(), StageError, "error")

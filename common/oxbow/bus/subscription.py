@@ -37,9 +37,12 @@ class Subscription:
 
     def close(self) -> None:
         """Receive nothing more, and return when all that had been received is dealt with."""
+        # Swapped first: a second call finds nothing to undeclare, and zenoh raises where something is undeclared
+        # twice.
         declared, self._declared = self._declared, ()
         for each in declared:
             each.undeclare()
+        # Only now, so that no sample finds the mailbox closed.
         self._mailbox.close()
 
 

@@ -87,9 +87,11 @@ class Client(Closing):
         self.client_id = uuid.uuid4().hex
         with ExitStack() as stack:
             self._bus = stack.enter_context(Bus.connect(endpoint, timeout_s=timeout_s))
+            # The wait for the router has used part of the time.
             self._bus.wait_ready(["mission"], max(0.0, give_up - time.monotonic()))
             # While it is there, the service waits for answers with this client.
             self._bus.declare_live(live_key("client", self.client_id))
+            # Nothing is raised from this line on: until it, whatever fails leaves the bus again.
             self._stack = stack.pop_all()
 
     def close(self) -> None:
@@ -202,6 +204,7 @@ class Client(Closing):
         """Where the latest revision of each mission stands, oldest mission first."""
         try:
             replies = self._ask_kept(str(MissionKey(ANY, "status")))
+        # The service refuses a query that matches no mission; without any mission, that is no fault.
         except InvalidMission:
             return []
         return list(_readable_statuses(replies))
@@ -236,6 +239,11 @@ class Client(Closing):
             The mission.
         history, timeout_s
             As in `plans`.
+
+        Returns
+        -------
+        PlanUpdates
+            An iterator that waits for them, until it or the client is closed.
         """
         return self._updates("replan", mission_id, history, timeout_s)
 
@@ -255,6 +263,7 @@ class Client(Closing):
             mission = parse_mission(mission)
         elif isinstance(mission, Path | str):
             mission = read_mission(mission)
+        # The id is settled here, not by the service: asked again, the same submission is then known to it.
         parameters = SubmissionParameters(id=mission_id, deadline_s=deadline_s, client=self.client_id, **options)
         return Submission(mission, parameters)
 
@@ -316,6 +325,7 @@ def _own_plan(payload: bytes, submission: Submission) -> Mission:
     if update.mission_id != submission.mission_id or update.revision < 1:
         other = f"{excerpt(update.mission_id)}, revision {update.revision}"
         raise Internal(f"the mission service answered by the plan of mission {other}", where=where)
+    # The document leaves out what planning adds: paths, plan, id and revision.
     if Submission(update.mission).document != submission.document:
         raise Internal("the mission service answered by a plan of other content", where=where)
     return update.mission

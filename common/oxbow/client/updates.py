@@ -70,6 +70,11 @@ def read_status(payload: bytes, mission_id: str | None = None) -> MissionStatus:
     mission_id
         The mission that it must be about; any where absent.
 
+    Returns
+    -------
+    MissionStatus
+        Of that mission, where one is named.
+
     Raises
     ------
     InvalidMission
@@ -143,6 +148,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
             if history:
                 self._first_catch_up()
             else:
+                # Only what comes after these is new; a revision that is being planned now is among it.
                 self._seen = {status.mission_id: _last_of(status) for status in self._statuses()}
         except BaseException:
             self.close()
@@ -165,6 +171,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
         """Receive nothing more, and end the iteration."""
         self._closed = True
         self._subscription.close()
+        # Wakes a thread that waits in `_listen`, which then sees that it is over.
         self._live.put(None)
 
     # ----------------------------------------------------------------- listening
@@ -185,6 +192,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
         if heard.revision <= self._seen.get(heard.mission_id, 0):
             return  # published twice, once before and once after a crash of the service
         try:
+            # The publication itself is not passed on: anyone may put one. What the service keeps is.
             self._fetch(heard.mission_id)
         except OxbowError as error:
             _log.warning("%s: cannot be compared with what is kept: %s", key, error)
@@ -242,6 +250,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
                 _log.warning("%s: passed over: %s", excerpt(own_key), error)
             else:
                 found[update.revision] = update
+        # Replies arrive in any order; revisions of a mission are seen in theirs.
         for revision in sorted(found):
             if revision > seen:
                 self._pending.append(found[revision])

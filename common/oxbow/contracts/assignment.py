@@ -74,6 +74,7 @@ class Vehicle(Message, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         if not self.name:
             raise InvalidMission("is empty; expected a name for every vehicle", where="name")
+        # Before the name is quoted below in the errors of other fields.
         if len(self.name) > MOST_ID_CHARACTERS:
             raise InvalidMission(
                 f"is {excerpt(self.name)}; expected at most {MOST_ID_CHARACTERS} characters", where="name"

@@ -26,6 +26,11 @@ def nominal_spacing_m(area_m2: float, length_m: float, least_m: float = 0.0) -> 
         What a vehicle may travel; positive.
     least_m
         The least spacing that is accepted.
+
+    Returns
+    -------
+    float
+        In metres, greater than 0.
     """
     return max(min(area_m2 / length_m, length_m / LEAST_SPACINGS), least_m)
 

@@ -53,9 +53,11 @@ class Cell(Message, frozen=True, kw_only=True):
             chain = getattr(self, field)
             if chain.ndim != 2 or chain.shape[1] != 2 or len(chain) < 1 or (np.diff(chain[:, 0]) < 0).any():
                 raise InvalidMission("is not an (n, 2) chain with non-decreasing u", where=field)
+            # As `<=`, since NaN compares false and would pass a test for `>`.
             if not (np.abs(chain) <= FARTHEST_M).all():
                 message = f"has coordinates that are not finite, or beyond {FARTHEST_M:g} m"
                 raise InvalidMission(message, where=field)
+        # Exactly: both chains come from one sweep, which takes their ends from the same critical points.
         if (self.floor[[0, -1], 0] != self.ceiling[[0, -1], 0]).any():
             raise InvalidMission("begins or ends at another u than the floor", where="ceiling")
 

@@ -25,11 +25,17 @@ def checked_id(text: str, where: str = "id") -> str:
     where
         The field that it comes from, for the error.
 
+    Returns
+    -------
+    str
+        The text as it was given: nothing is trimmed or replaced.
+
     Raises
     ------
     InvalidMission
         It is empty, too long, begins with ``.`` or ``@``, or has a character that is not accepted.
     """
+    # The length first: no pattern is matched against megabytes from outside.
     if len(text) <= MOST_ID_CHARACTERS and _ID.fullmatch(text):
         return text
     accepted = f"expected 1 to {MOST_ID_CHARACTERS} of A-Z a-z 0-9 _ . -"

@@ -41,6 +41,11 @@ def live_key(service: str, instance: str) -> str:
     instance
         One process of it.
 
+    Returns
+    -------
+    str
+        ``oxbow/v1/live/{service}/{instance}``.
+
     Raises
     ------
     InvalidMission
@@ -66,6 +71,11 @@ def introspection_key(service: str, instance: str, what: str) -> str:
         One process of it.
     what
         One of `INTROSPECTION`; of the supervisor, ``processes``.
+
+    Returns
+    -------
+    str
+        ``oxbow/v1/stage/{service}/{instance}/@{what}``.
 
     Raises
     ------
@@ -125,6 +135,7 @@ class MissionKey:
         return cls(mission_id, what, int(revision) if revision and revision != ANY else revision)
 
 
+# At most nine digits: Python refuses to convert a number of thousands, and a key comes from anybody.
 _MISSION_KEY = re.compile(rf"{PREFIX}/mission/([^/]+)/([a-z]+)(?:/([0-9]{{1,9}}|\*))?")
 
 
@@ -137,6 +148,11 @@ def mission_key(mission_id: str, what: str) -> str:
         One mission.
     what
         As in `MissionKey`; also ``cancel``.
+
+    Returns
+    -------
+    str
+        ``oxbow/v1/mission/{id}/{what}``.
 
     Raises
     ------
@@ -160,6 +176,11 @@ def layer_key(mission_id: str, stage: str, name: str) -> str:
         The stage that shows the layer.
     name
         The layer's name.
+
+    Returns
+    -------
+    str
+        ``oxbow/v1/layer/{id}/{stage}/{name}``.
 
     Raises
     ------

@@ -42,6 +42,16 @@ class Endpoint(Generic[Q, R]):
             One replica.
         what
             One of `INTROSPECTION`.
+
+        Returns
+        -------
+        str
+            ``oxbow/v1/stage/{stage}/{instance}/@{what}``.
+
+        Raises
+        ------
+        InvalidMission
+            The instance is not accepted (`checked_id`).
         """
         return introspection_key(self.stage, instance, what)
 

@@ -65,6 +65,7 @@ def _united(polygons: Mapping[int, Polygon]) -> Iterator[Joined]:
 def _may_be_cut(rings: Sequence[FloatArray]) -> bool:
     """Whether a polygon may have been cut at the antimeridian: it has an edge there, and all of it is near."""
     away = np.abs(_eastward(rings[0][:, 0]) - ANTIMERIDIAN)
+    # Two vertices on the antimeridian make an edge there; a single one only touches it.
     return len(away) > 2 and int((away <= SNAP_DEG).sum()) > 1 and bool((away <= MOST_REACH_DEG).all())
 
 
@@ -87,4 +88,5 @@ def _rings(polygon: Polygon) -> tuple[FloatArray, ...]:
 
 def _westward(degrees: FloatArray) -> FloatArray:
     long, lat = degrees.T
+    # Exactly 180 stays 180, so that a vertex on the antimeridian has the same sign on both sides of a former cut.
     return np.round(np.column_stack([np.where(long > ANTIMERIDIAN, long - 360.0, long), lat]), DECIMALS)

@@ -41,6 +41,7 @@ def self_contact(polygon: Polygon) -> Place | None:
     TooManyPairs
         It cannot be decided in bounded time.
     """
+    # The sample first: where crossings are many it finds one at once, and GEOS would look at all of them.
     for contact in _sampled_contacts(polygon):
         return float(contact[0]), float(contact[1])
     if _is_valid(polygon):
@@ -69,6 +70,7 @@ def _is_valid(geometry: BaseGeometry) -> bool:
 
 def _sampled_contacts(geometry: BaseGeometry) -> Iterator[FloatArray]:
     """Places where a sample of a geometry's edges meets others of the same ring; nothing where edges are few."""
+    # So few edges cannot have too many pairs, whatever their shape: GEOS decides in bounded time.
     if int(shapely.get_num_coordinates(geometry)) ** 2 <= MOST_PAIRS:
         return
     edges = Edges.of(shapely.get_parts([geometry]))
@@ -129,6 +131,11 @@ class Edges:
         sample
             Look for the meetings of only this many edges; by default, of all.
 
+        Returns
+        -------
+        iterator of ndarray of int, shape (pairs, 2)
+            Indices of the edges; of two that were both looked up, each pair comes once. Parts may be empty.
+
         Raises
         ------
         TooManyPairs
@@ -146,6 +153,7 @@ class Edges:
             # Two edges that are both looked up find each other twice; the pair counts once.
             fresh = (first < second) | ~wanted[second]
             yield self._meeting(first[fresh], second[fresh])
+            # An estimate from what was looked up so far, judged against a full sample before it is believed.
             if pairs * len(order) > MOST_PAIRS * max(begin, min(_SAMPLE, len(order))):
                 raise TooManyPairs
             # Each edge finds itself, so pairs > 0. At most doubled: a dense part may follow a sparse one.

@@ -82,6 +82,7 @@ def geodesic_length_m(lonlat: FloatArray) -> float:
 
 
 def _wrapped(degrees: FloatArray) -> FloatArray:
+    # From -180 inclusive to 180 exclusive.
     return (degrees + 180.0) % 360.0 - 180.0
 
 

@@ -36,6 +36,7 @@ def lattice_within(
         In metres, row by row.
     """
     row, x = _crossings(area, origin[1], row_m)
+    # Crossings of a row come in pairs, entry and exit, because there is an even number of them in each.
     row, low, high = row[::2], x[::2], x[1::2]
     start = origin[0] + shift_m * (row % 2)
     first = np.ceil((low - start) / pitch_m).astype(np.int64)
@@ -58,6 +59,7 @@ def _crossings(area: BaseGeometry, first_row_m: float, row_m: float) -> tuple[In
     a, b = start[side], end[side]
     share = (row - rows[a]) / (rows[b] - rows[a])
     x = xy[a, 0] + share * (xy[b, 0] - xy[a, 0])
+    # By row, and within a row by x: entries and exits then alternate.
     order = np.lexsort((x, row))
     return row[order], x[order]
 

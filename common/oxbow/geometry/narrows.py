@@ -74,6 +74,11 @@ def is_basin(part: Polygon, safety_m: float, width_m: float) -> bool:
         The distance that paths keep from the shore.
     width_m
         The least width of water that counts; at 0, no part is too thin.
+
+    Returns
+    -------
+    bool
+        False also for a strip that is thin on average (`is_thin`).
     """
     radius_m = float(shapely.minimum_bounding_radius(part))
     return radius_m > max(safety_m, width_m) and not is_thin(part, width_m)
@@ -88,6 +93,11 @@ def is_thin(part: Polygon, width_m: float) -> bool:
         Of positive extent, in metres.
     width_m
         The least width of water that counts; at 0, only a part without area is thin.
+
+    Returns
+    -------
+    bool
+        True also where the part has no area.
     """
     return bool(part.area <= THIN * width_m * 2.0 * float(shapely.minimum_bounding_radius(part)))
 
@@ -101,6 +111,11 @@ def direct_leg_m(safety_m: float, ashore_m: float) -> float:
         The distance that paths keep from the shore.
     ashore_m
         How far the place is from the water.
+
+    Returns
+    -------
+    float
+        3.5 safety distances, and 1.5 times the way over land.
     """
     return DIRECT_SHARE * safety_m + DETOUR * ashore_m
 

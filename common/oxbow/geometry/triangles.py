@@ -127,6 +127,11 @@ def apexes(triangles: Indices, sides: Indices) -> Indices:
         Corners of each, as indices into the points.
     sides : ndarray of int, shape (k,)
         Numbers of sides.
+
+    Returns
+    -------
+    ndarray of int, shape (k,)
+        In the order of the sides. A side of -1 gives a corner of the last triangle, which means nothing.
     """
     # Corner j + 2 is corner j - 1, and index -1 the last corner.
     return np.asarray(triangles[sides // 3, sides % 3 - 1])
@@ -152,6 +157,7 @@ def flipped(triangles: Indices, sides: Indices, twins: Indices) -> Indices:
     (t, j), u = np.divmod(sides, 3), twins // 3
     tail, head, apex, beyond = triangles[t, j], triangles[t, j - 2], triangles[t, j - 1], apexes(triangles, twins)
     triangles = triangles.copy()
+    # Both stay counterclockwise: the new diagonal runs from `beyond` to `apex`.
     triangles[t] = np.column_stack([tail, beyond, apex])
     triangles[u] = np.column_stack([beyond, head, apex])
     return triangles
@@ -164,6 +170,11 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     ----------
     a, b : ndarray, shape (..., 2)
         Shapes that broadcast.
+
+    Returns
+    -------
+    ndarray of float
+        Of the shape of the arguments without their last axis, in the product of their units.
     """
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
@@ -202,8 +213,10 @@ def _without_flats(points: FloatArray, triangles: Indices) -> Indices:
     flipped, and rounding decides which of their sides is the longest: a side that has been flipped away does not
     come back, or two of them could flip one side to and fro for ever.
     """
+    # Coordinates far from the origin carry fewer decimals: what counts as flat grows with them.
     rounding_m = ROUNDING * float(np.abs(points).max(initial=0.0))
     gone = np.empty(0, dtype=np.intp)
+    # Ends: each round drops a triangle, or flips sides that may not come back, of which there are finitely many.
     while True:
         twins, lengths = twins_of(triangles), side_lengths(points[triangles])
         longest = lengths.max(axis=1, keepdims=True)
@@ -220,6 +233,7 @@ def _without_flats(points: FloatArray, triangles: Indices) -> Indices:
         sides = sides[~np.isin(after, gone)]
         if len(sides) == 0:
             return triangles
+        # Flips of one round are made at once, so that no two of them may share a triangle.
         sides = sides[_first_claims(sides // 3, twins[sides] // 3)]
         before = _keys(triangles.ravel()[sides], triangles.ravel()[following(sides)], len(points))
         gone = np.append(gone, before)

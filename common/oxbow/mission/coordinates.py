@@ -45,6 +45,11 @@ def lonlat_of(points: Sequence[Sequence[float]], place: str) -> FloatArray:
     place
         What errors call the list.
 
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Longitudes and latitudes in degrees.
+
     Raises
     ------
     InvalidMission
@@ -97,6 +102,7 @@ def _system_name(crs: Any) -> str | None:
         return None
     if "code" in properties:  # {"type": "EPSG", "properties": {"code": 4326}}, before 2008
         return f"EPSG:{properties['code']}"
+    # As the GeoJSON of 2008 has it: {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}.
     name = properties.get("name")
     return name if isinstance(name, str) else None
 

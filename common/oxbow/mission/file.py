@@ -205,6 +205,7 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
             )
         if self.bloom is not None and not math.isfinite(self.bloom.value):
             raise InvalidMission(f"is {self.bloom.value!r}; expected a finite number", where="Bloom.Value")
+        # Else the file that is written would have the field twice, and its reader would take either.
         if clash := FIELD_NAMES & self.extra.keys():
             raise InvalidMission("is a field of the Mission File, not an extra one", where=min(clash))
         require_dangers(self.danger_zones or ())
@@ -306,7 +307,9 @@ def parse_mission(data: bytes) -> Mission:
     document = gathered(
         decode_json(utf8(data, "Mission File"), dict[str, msgspec.Raw], "Mission File"), FIELD_NAMES
     )
+    # Both names are accepted, and the one that was used is written back: other programs may know only that.
     names = [name for name in OutlineName if name in document]
+    # Neither could be preferred without dropping a contour silently.
     if len(names) > 1:
         raise InvalidMission("is given beside BoundingBox, its newer name; expected one of them", where="InBox")
     for name, (kind, is_list) in _PARTS.items():

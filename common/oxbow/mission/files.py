@@ -28,6 +28,11 @@ def read_bytes(path: Path, limit: int) -> bytes:
     limit
         The most bytes to accept.
 
+    Returns
+    -------
+    bytes
+        All of it; empty for an empty file.
+
     Raises
     ------
     InvalidMission
@@ -38,6 +43,7 @@ def read_bytes(path: Path, limit: int) -> bytes:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         with open(descriptor, "rb") as file:  # noqa: PTH123 - what is open already
             data = _begun(descriptor, str(path))
+            # What follows may wait for a writer: it is there, and its end of file will come.
             os.set_blocking(descriptor, True)
             data += file.read(limit + 1 - len(data))  # one byte more shows that the file is too large
     except OSError as error:
@@ -92,6 +98,7 @@ def write_atomically(path: Path, data: bytes) -> None:
             file.flush()
             if target.exists():
                 os.fchmod(file.fileno(), stat.S_IMODE(target.stat().st_mode))
+            # Before the rename: some file systems put the new name on the disk before the new content.
             os.fsync(file.fileno())
         scratch.replace(target)
     finally:
@@ -114,6 +121,7 @@ def move_into_place(source: Path, target: Path) -> None:
     OSError
         It cannot be moved; what was there stays, and nothing is left beside it.
     """
+    # Beside the target first: `shutil.move` copies across file systems, and readers must not see half a copy.
     scratch = target.with_name(f".oxbow-{secrets.token_hex(8)}.tmp")
     try:
         shutil.move(source, scratch)

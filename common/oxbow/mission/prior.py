@@ -83,6 +83,7 @@ class PriorFeature(msgspec.Struct, frozen=True, kw_only=True):
                 " would have to be compared; expected shorter edges or fewer points",
                 where="geometry",
             ) from error
+        # The reason is text for people, and takes as long again: asked only where there is something to report.
         if not is_sound:
             reason = shapely.is_valid_reason(self.geometry)
             raise InvalidMission(f"is not a valid {kind} ({reason} in degrees)", where="geometry")
@@ -159,6 +160,11 @@ def parse_prior(data: bytes, name: str = "PriorModel") -> PriorModel:
         The collection in JSON, with the foreign member ``variogram`` where there is one.
     name
         What it is called in errors.
+
+    Returns
+    -------
+    PriorModel
+        Its features in the order of the file.
 
     Raises
     ------

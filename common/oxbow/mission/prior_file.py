@@ -56,8 +56,10 @@ def read_prior(path: Path) -> PriorModel:
 def _ascii_grid(path: Path) -> Raster:
     """Read an ESRI ASCII grid: a header of names and numbers, then rows of values from north to south."""
     name = str(path)
+    # Undecodable bytes become replacement characters, which are then refused as numbers, with their text.
     words = utf8(read_bytes(path, MAX_REQUEST_BYTES), name).decode("utf-8", "replace").split()
     begin = 0
+    # The header has no fixed number of lines: it ends at the first word that is none of its names.
     while begin < len(words) and words[begin].lower() in _HEADER:
         begin += 2
     header = _Header(name, dict(zip(map(str.lower, words[:begin:2]), words[1:begin:2], strict=False)))
@@ -130,6 +132,7 @@ def _geotiff(path: Path) -> Raster:
 
 def _raster(name: str, dataset: Any) -> Raster:
     """The only band of an open rasterio dataset."""
+    # From the file's header, before `read` allocates what a forged one asks for.
     require_size(name, dataset.height, dataset.width)
     if dataset.count != 1:
         raise InvalidMission(f"has {dataset.count} bands; expected one, of weights", where=name)

@@ -67,6 +67,7 @@ class Raster:
 
     def features(self) -> tuple[PriorFeature, ...]:
         """The cells of each weight, united; cells without one are left out."""
+        # Rounded by text, which is slow: so only the distinct weights are, not those of all 250 000 cells.
         rows, columns = np.nonzero(~np.isnan(self.weights))
         values, value_of_cell = np.unique(self.weights[rows, columns], return_inverse=True)
         rounded = [float(f"{value:.{DIGITS}g}") for value in values.tolist()]
@@ -86,6 +87,8 @@ class Raster:
 
     def _degrees(self, columns_rows: FloatArray) -> FloatArray:
         degrees = (self.west, self.north) + columns_rows * (self.step_long, self.step_lat)
+        # Rounded alike, cells that share a corner share it exactly, whatever the multiplication left in the last
+        # digits.
         return np.round(degrees, DECIMALS)
 
 

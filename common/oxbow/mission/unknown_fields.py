@@ -36,6 +36,7 @@ def _in_parts(
 
 
 def _like(unknown: Iterable[str], known: Iterable[str], prefix: str) -> Iterator[str]:
+    # Without regard to capitals: `Least_Width` differs from `Least_width` in nothing else.
     names = {name.lower(): name for name in known}
     for field in unknown:
         close = difflib.get_close_matches(field.lower(), names, n=1, cutoff=ALIKE)

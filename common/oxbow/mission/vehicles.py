@@ -76,6 +76,7 @@ def require_distinct(vehicles: Sequence[GivenVehicle]) -> None:
         where = f"Vehicles[{index}]"
         if not vehicle.name:
             raise InvalidMission("is empty; expected a name for every vehicle", where=f"{where}.Name")
+        # Plans, recordings and errors tell vehicles apart by their names alone.
         if (first := seen.setdefault(vehicle.name, index)) < index:
             raise InvalidMission(
                 f"is {vehicle.name!r}, as that of Vehicles[{first}]; expected a name of its own", f"{where}.Name"

@@ -50,6 +50,11 @@ class Contour:
         positions
             Its points in order, closed or not; neighbours may be equal.
 
+        Returns
+        -------
+        Contour
+            Of three points or more; which orientation they have does not matter.
+
         Raises
         ------
         InvalidMission
@@ -67,6 +72,8 @@ class Contour:
         xy = frame.to_planar(self.degrees)
         if not np.isfinite(xy).all():
             raise InvalidMission("reaches to the other side of the Earth", where=self.name)
+        # The hull and not the contour's own area: a figure of eight may have none, and encloses water all the
+        # same.
         hull = shapely.convex_hull(LineString(xy))
         # Both long sides of a strip are in its hull's perimeter.
         if hull.area < LEAST_WIDTH_M * hull.length / 2:
@@ -104,7 +111,9 @@ class Contour:
         """Where an outline meets itself, and which of its edges do."""
         xy = shapely.get_coordinates(polygon)
         distance = shapely.distance(shapely.linestrings(np.stack([xy[:-1], xy[1:]], axis=1)), Point(place))
+        # The two edges nearest to the place are those that meet there.
         edges = np.sort(np.argsort(distance, kind="stable")[:2])
+        # Points of the Mission File, repeated ones counted: the author looks for them there.
         following = np.roll(self.indices, -1)
         one, other = (f"the edge from point {self.indices[edge]} to {following[edge]}" for edge in edges)
         long, lat = frame.to_degrees(np.array([place]))[0]
@@ -163,6 +172,11 @@ def forbidden_zones(mission: Mission, frame: Frame, outline: Polygon) -> list[Zo
     outline
         The site's contour in that plane, valid.
 
+    Returns
+    -------
+    list of Zone
+        In the order of the mission. A zone outside the water has no parts, and a warning says so.
+
     Raises
     ------
     InvalidMission
@@ -186,6 +200,11 @@ def danger_zones(mission: Mission, frame: Frame, outline: Polygon) -> list[Zone]
         The site's plane.
     outline
         The site's contour in that plane, valid.
+
+    Returns
+    -------
+    list of Zone
+        In the order of the mission, as of `forbidden_zones`.
     """
     contours = [
         Contour.of(f"DangerZones[{index}].Contour", zone.contour)
@@ -258,6 +277,7 @@ class _Zones:
 
 def _enclosed(zone: Polygon) -> tuple[Polygon, ...]:
     """All that a contour which meets itself encloses, whichever way it was meant."""
+    # Not `make_valid`, which would leave out what an even number of rounds encloses.
     faces = shapely.polygonize([shapely.node(zone.exterior)])
     whole = shapely.union_all(shapely.get_parts(faces))
     return tuple(Polygon(part.exterior) for part in shapely.get_parts(whole))

@@ -126,6 +126,11 @@ def members(mission: Mission, locate: Locate) -> tuple[Member, ...]:
         The mission.
     locate
         Brings the start and the recovery of each to the site's plane.
+
+    Returns
+    -------
+    tuple of Member
+        At least one for each role that takes part; within a role, in the order of the mission.
     """
     given = mission.vehicles
     if given is None:

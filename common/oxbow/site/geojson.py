@@ -121,6 +121,8 @@ class _Area:
         shell = self.rings[0]
         if len(shell) < 3:
             return 0.0
+        # A degree of longitude shrinks with the cosine of the latitude; the error of one latitude for all is
+        # small here.
         return float(shapely.Polygon(shell).area * np.cos(np.radians(shell[0, 1])))
 
 
@@ -181,6 +183,7 @@ def mission_from_geojson(  # noqa: PLR0913 - one parameter for each field of the
         safety_m=safety_m,
         minimal_spatial_rate_m=minimal_spatial_rate_m,
     )
+    # For its checks alone: what cannot be planned is refused now, while the author looks at the document.
     Site.of(mission)
     notes = [f"passed over {_counted(passed_over)}: only polygons are water"] if passed_over else []
     if area not in given:
@@ -260,6 +263,7 @@ def _areas(placed: _Placed) -> list[_Area]:
 def _ring(place: str, points: list[list[float]]) -> FloatArray:
     """A ring in degrees, less its closing point, however often it is repeated."""
     degrees = lonlat_of(points, place)
+    # Up to the last point that differs from the first: some programs close a ring more than once.
     others = np.flatnonzero((degrees != degrees[:1]).any(axis=1))
     return degrees[: others[-1] + 1] if len(others) else degrees[:1]
 
@@ -299,6 +303,7 @@ def _chosen(areas: Sequence[_Area], part: int | None, passed_over: Counter[str])
 
 def _sizes(areas: Sequence[_Area]) -> str:
     """The largest areas: number, name and size."""
+    # By rough size: an exact one needs a projection, which takes a millisecond for each of thousands of polygons.
     largest = sorted(range(len(areas)), key=lambda index: -areas[index].rough_size)[:MOST_LISTED]
     texts = [
         f"{index} ({', '.join(filter(None, (areas[index].name, f'{areas[index].km2:.4g} km2')))})"

@@ -90,6 +90,7 @@ def hot_spots(
                 spots.append(spot)
             else:
                 warnings.append(f"PriorModel.{spot.name} lies outside the water: it is not treated")
+    # Overlaps would be treated, and counted, twice.
     if overlap := first_overlap(spots):
         raise InvalidMission(
             f"overlaps {overlap.one.name} by {overlap.area_m2:.0f} m2; expected hot spots apart from one another,"
@@ -106,6 +107,7 @@ def first_overlap(spots: Sequence[HotSpot]) -> Overlap | None:
     one, other = one[one < other], other[one < other]
     shared_m2 = shapely.area(shapely.intersection(areas[one], areas[other]))
     smaller_m2 = np.minimum(shapely.area(areas[one]), shapely.area(areas[other]))
+    # The first pair alone: an error names one, and its author mends the file step by step.
     for pair in np.flatnonzero(shared_m2 > LEAST_PART * smaller_m2)[:1].tolist():
         return Overlap(spots[one[pair]], spots[other[pair]], float(shared_m2[pair]))
     return None
@@ -135,6 +137,7 @@ def _require_water(geometry: BaseGeometry, water: BaseGeometry, frame: Frame, wh
 
 def _areas(geometry: BaseGeometry, swath_m: float) -> list[Polygon]:
     """The polygons of a feature, or the discs about its points."""
+    # A point stands for water of unknown extent: a disc in which any pass within a swath of it counts.
     areas = geometry if geometry.area > 0 else geometry.buffer(swath_m)
     return [part for part in shapely.get_parts(areas) if part.area > 0]
 

@@ -67,6 +67,11 @@ def planar(geometry: BaseGeometry, frame: Frame, outline: Polygon) -> BaseGeomet
         The site's plane.
     outline
         The site's contour in that plane.
+
+    Returns
+    -------
+    shapely geometry
+        Valid, in planar metres; empty where nothing of it is near the site.
     """
     near = geometry.intersection(_surroundings(frame, outline))
     return shapely.make_valid(shapely.transform(shapely.segmentize(near, EDGE_DEG), frame.to_planar))
@@ -112,6 +117,9 @@ class _Weighted:
         """What is left of each area once those after it are painted over it, as layers of a map are."""
         pairs = STRtree(self.areas).query(self.areas)
         lower, upper = pairs[:, pairs[1] > pairs[0]]
+        # Areas that only touch, as cells of a raster do, leave one another whole: a difference would cost time,
+        # and add
+        # vertices along their common sides.
         covers = shapely.relate_pattern(self.areas[lower], self.areas[upper], INTERIORS_MEET)
         lower, upper = lower[covers], upper[covers]
         areas = self.areas.copy()

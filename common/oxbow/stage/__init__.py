@@ -42,6 +42,7 @@ def serve_stage(endpoint: str, handler: str, argv: list[str] | None = None) -> N
     options = _options(handler, argv)
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s")
     lifetime = Lifetime(options.parent)
+    # Before the bus: the worker loads its libraries while the session looks for the router.
     worker = Worker(endpoint, handler, options.instance, options.memory_mb)
     try:
         session = Session.join(options.connect, lambda: lifetime.over)
@@ -94,6 +95,7 @@ def _count(least: int) -> Callable[[str], int]:
     """Reads a whole number from `least` to a million."""
 
     def count(text: str) -> int:
+        # The length first: `int` refuses thousands of digits with an error of its own.
         if not (text.isdecimal() and len(text) <= 7 and least <= int(text) <= 10**6):
             raise argparse.ArgumentTypeError(f"is {text!r}; expected a whole number from {least} to {10**6}")
         return int(text)

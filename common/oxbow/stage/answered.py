@@ -41,6 +41,11 @@ class Answered:
         request
             The encoded request.
 
+        Returns
+        -------
+        Done, Failed or None
+            An error is kept like a reply: the request would end in it again.
+
         Raises
         ------
         InvalidMission
@@ -64,9 +69,11 @@ class Answered:
         answer
             The reply or the error.
         """
+        # Popped rather than overwritten: a renewed answer is the newest, also in the order of the dictionary.
         self._forget(self._kept.pop(request_id, None))
         self._kept[request_id] = _Kept(request_digest, answer)
         self._bytes += _size(answer)
+        # This may forget the answer just put, if it alone is too large; it has been sent already.
         while self._bytes > self.most_bytes:
             self._forget(self._kept.popitem(last=False)[1])
 

@@ -49,6 +49,7 @@ def serve(pipe: Connection, endpoint: str, handler: str, instance: str, memory_m
         while True:
             job = msgspec.msgpack.decode(pipe.recv_bytes(), type=Job)
             _send(pipe, adapter.outcome(job))
+    # The session process has closed the pipe, or died: either way there is nobody left to work for.
     except (EOFError, OSError):
         return
 
@@ -117,6 +118,7 @@ class _Adapter:
 
 def is_memory_error(error: BaseException) -> bool:
     """Whether an exception means that there was no memory left."""
+    # GEOS reports a failed allocation as text only.
     return isinstance(error, MemoryError) or (isinstance(error, ShapelyError) and "bad_alloc" in str(error))
 
 

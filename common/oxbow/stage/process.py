@@ -69,6 +69,7 @@ def _exit_at_hang_up(fd: int) -> None:
 
 def _limit_memory(memory_mb: int) -> None:
     """Limit the memory of this process's own: code, mapped files and reserved addresses do not count."""
+    # Not RLIMIT_AS: thread stacks and libraries reserve gigabytes of addresses which they never touch.
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)
     wanted = memory_mb * 2**20
     resource.setrlimit(

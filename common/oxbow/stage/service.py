@@ -79,6 +79,7 @@ class Stage:
         self._answered = Answered(MOST_ANSWERED_BYTES)
         self._served = self._failed = self._busy = 0
         self._seconds: deque[float] = deque(maxlen=1000)
+        # Asked about at each job: layers cost time to make and to send, and mostly nobody records.
         self._audience = session.audience(self.described.layers_key)
         self._requests = Mailbox("requests", self._work, size=queue_size)
         self._queryable = session.declare_queryable(self.described.instance_key, self._accept)
@@ -118,6 +119,7 @@ class Stage:
         with self._lock:
             same = self._open.get(envelope.request_id)
             if same is not None:
+                # Before the query joins: an id that is used twice must not get the other request's plan.
                 require_same(envelope.request_id, digest(same.queries[0].payload), query.payload)
                 same.queries.append(query)
                 return None
@@ -168,6 +170,7 @@ class Stage:
     def _answer(self, exchange: _Exchange) -> Done | Failed:
         """Have the worker answer; an error raised by this is not about the request, which may be asked again."""
         envelope = exchange.envelope
+        # Looked at when it is taken from the queue, not when it came: it may have waited past its deadline.
         if envelope.remaining_s() <= 0:
             raise DeadlineExceeded("not started: the deadline passed in the queue", where=self.described.stage)
         self._require_worker()
@@ -179,6 +182,7 @@ class Stage:
         except OxbowError as error:
             _log.error("request %s: %s", envelope.request_id, error)
             raise
+        # Outside the lock, on which the network thread waits: a digest of 128 MB takes a tenth of a second.
         of = digest(payload)
         with self._lock:
             self._answered.put(envelope.request_id, of, answer)
@@ -254,6 +258,7 @@ class Stage:
             busy=busy,
             queued=len(self._requests),
             mean_s=fmean(seconds) if seconds else 0.0,
+            # `quantiles` needs two values; of one, the sum is the value, and of none it is 0.
             p95_s=quantiles(seconds, n=20, method="inclusive")[-1] if len(seconds) > 1 else sum(seconds),
             worker_restarts=self.worker.restarts,
             session_rss_bytes=rss_bytes(os.getpid()),

@@ -67,6 +67,7 @@ class Watch:
 
     def _run(self) -> None:
         running = time.monotonic()
+        # In slices: whether a process is stopped can only be asked, not waited for beside a deadline.
         while not self._over.wait(min(_SLICE_S, max(0.0, self._deadline_s - time.time()))):
             self.data_bytes = max(self.data_bytes, _data_bytes(self._process.pid))
             if not is_stopped(self._process.pid):
@@ -76,6 +77,7 @@ class Watch:
             elif time.monotonic() - running > STOPPED_S:
                 self.verdict = Verdict.FROZEN
             if self.verdict is not None:
+                # SIGKILL, the only signal that ends a stopped process.
                 self._process.kill()
                 return
 

@@ -197,6 +197,7 @@ class Worker:
             reason = f"worker process {self.pid} was frozen for {STOPPED_S:g} s, and killed"
             return WorkerLost(reason, where=self.handler)
         try:
+            # The pipe closes before the process has ended: a moment is given to it, for its status says why.
             status = self._process.wait(END_S)
         except subprocess.TimeoutExpired:
             return WorkerLost(f"worker process {self.pid} closed its pipe, or sent garbage", where=self.handler)
@@ -209,6 +210,7 @@ class Worker:
     def _kill(self) -> None:
         self._pipe.close()
         self._process.kill()
+        # Reaped, or it would stay in the process table as a zombie.
         self._process.wait()
 
 
@@ -221,6 +223,11 @@ def needs_memory(memory_mb: int, where: str) -> Infeasible:
         What the worker process may take.
     where
         The stage, or its handler.
+
+    Returns
+    -------
+    Infeasible
+        To be raised, or sent, by the caller.
     """
     return Infeasible(
         f"needs more than the {memory_mb} MB of memory that a worker process may take (--memory-mb)", where=where
@@ -238,6 +245,11 @@ def is_want_of_memory(status: int, data_bytes: int, memory_mb: int) -> bool:
         The most memory that it was seen to have.
     memory_mb
         Its limit.
+
+    Returns
+    -------
+    bool
+        False for a process that was killed from outside, or died of a fault with memory to spare.
     """
     return status in _FAULTS and data_bytes > _FULL_SHARE * memory_mb * 2**20
 
@@ -257,4 +269,5 @@ def _signal_name(number: int) -> str:
 def one_threaded() -> dict[str, str]:
     """An environment in which linear algebra takes one thread: results must not depend on the number of cores."""
     threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    # What the user has set takes precedence.
     return {**threads, **os.environ}

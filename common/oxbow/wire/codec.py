@@ -29,6 +29,7 @@ def _to_wire(value: Any) -> Any:
         return shapely.to_wkb(value)
     if isinstance(value, np.ndarray):
         return [_FLOAT, list(value.shape), np.ascontiguousarray(value, dtype=_FLOAT).tobytes()]
+    # Array arithmetic leaves such scalars in messages; msgspec takes none but float64, which is a float.
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError(f"{type(value).__name__} cannot be sent")
@@ -90,6 +91,11 @@ def decode(data: bytes, kind: type[T]) -> T:
     kind
         The type of message to expect.
 
+    Returns
+    -------
+    message of type `kind`
+        It keeps its invariants: they are checked as it is built. Its arrays are read-only views of `data`.
+
     Raises
     ------
     InvalidMission
@@ -98,8 +104,10 @@ def decode(data: bytes, kind: type[T]) -> T:
     try:
         return msgspec.msgpack.decode(data, type=kind, dec_hook=_from_wire)
     except msgspec.ValidationError as error:
+        # msgspec reports the path only in the text of its error.
         match = _AT.fullmatch(str(error))
         problem, path = (match["problem"], f".{match['path']}") if match else (str(error), "")
         raise InvalidMission(f"{problem[:1].lower()}{problem[1:]}", where=f"{kind.__name__}{path}") from error
+    # What else malformed bytes raise: text that is not UTF-8, nesting too deep, lengths beyond 64 bits.
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, OverflowError) as error:
         raise InvalidMission(f"is no MessagePack of one: {error}", where=kind.__name__) from error

@@ -59,6 +59,7 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             raise InvalidMission(
                 f"is {excerpt(self.part)}; expected at most {MOST_ID_CHARACTERS} characters", where="part"
             )
+        # A deadline that has passed is valid: the request was late, not wrong, and is answered as such.
         if not (math.isfinite(self.deadline_s) and self.remaining_s() <= MOST_WAIT_S):
             raise InvalidMission(
                 f"is {self.deadline_s!r}; expected Unix time in s, at most {MOST_WAIT_S:g} s from now",
@@ -76,6 +77,7 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         InvalidMission
             The bytes are not an envelope, or too many.
         """
+        # Before anything is decoded: the size is all that is known of it.
         if len(data) > MOST_ENVELOPE_BYTES:
             raise InvalidMission(f"is {len(data)} bytes; at most {MOST_ENVELOPE_BYTES}", where="attachment")
         return decode_json(data, cls, "attachment")
@@ -106,5 +108,10 @@ class StageError(ErrorReply, frozen=True, kw_only=True):
             The request that failed; empty where its id could not be read.
         error
             What went wrong.
+
+        Returns
+        -------
+        StageError
+            With the code, message and place of `error`.
         """
         return cls(code=error.code, message=error.message, where=error.where, request_id=request_id)

@@ -70,6 +70,7 @@ class Supervision(msgspec.Struct, frozen=True, kw_only=True):
 def rss_bytes(pid: int) -> int:
     """Resident memory of a process in bytes; 0 where the system does not report it."""
     try:
+        # The second field is the resident set; only Linux has the file, and only while the process lives.
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     except OSError:
         return 0

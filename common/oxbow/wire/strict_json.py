@@ -44,6 +44,11 @@ def utf8(data: bytes, name: str) -> bytes:
     name
         What the file is called in errors.
 
+    Returns
+    -------
+    bytes
+        `data` itself where it has no mark.
+
     Raises
     ------
     InvalidMission
@@ -76,6 +81,11 @@ def decode_json(data: bytes, kind: type[T], name: str, *, at: str = "") -> T:
     at
         Its position in a larger document, which the names of fields in errors begin with.
 
+    Returns
+    -------
+    `kind`
+        The value, with every field of the type that `kind` declares for it.
+
     Raises
     ------
     InvalidMission
@@ -85,6 +95,7 @@ def decode_json(data: bytes, kind: type[T], name: str, *, at: str = "") -> T:
     try:
         return _decoded(data, kind, name, at)
     except msgspec.DecodeError as error:
+        # msgspec calls an empty document truncated input, which helps nobody who sent an empty file.
         if not data.strip():
             raise InvalidMission("is empty; expected JSON", where=name) from error
         raise InvalidMission(f"is not JSON: {_located(str(error), data)}", where=name) from error
@@ -112,6 +123,11 @@ def gathered(document: dict[str, msgspec.Raw], known: frozenset[str]) -> dict[st
         Names and undecoded values of the object's fields.
     known
         The names that have a field of their own.
+
+    Returns
+    -------
+    dict of str to msgspec.Raw
+        The known fields by their names in JSON, and `extra`, an object, which may be empty.
     """
     fields = {name: raw for name, raw in document.items() if name in known and bytes(raw) != b"null"}
     extra = {name: raw for name, raw in document.items() if name not in known}
@@ -133,6 +149,11 @@ def gathered_part(data: bytes, kind: type[msgspec.Struct], name: str, *, is_list
         What the document is called in errors.
     is_list
         Whether a list of objects is expected, rather than one object.
+
+    Returns
+    -------
+    msgspec.Raw
+        JSON in which each object has its unknown fields under `extra`; `data` where it is no such object or list.
 
     Raises
     ------

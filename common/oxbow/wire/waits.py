@@ -20,11 +20,17 @@ def checked_wait(seconds: float, where: str) -> float:
     where
         The field that it comes from, for the error.
 
+    Returns
+    -------
+    float
+        `seconds`, unchanged.
+
     Raises
     ------
     InvalidMission
         It is not a number from 0 to `MOST_WAIT_S`.
     """
+    # Negated, so that NaN is refused.
     if not 0.0 <= seconds <= MOST_WAIT_S:
         raise InvalidMission(f"is {seconds!r} s; expected 0 to {MOST_WAIT_S:g} s", where=where)
     return seconds

@@ -62,12 +62,18 @@ def from_wkb(data: bytes, kind: type[BaseGeometry]) -> BaseGeometry:
     kind
         The kind to expect; with `BaseGeometry` any kind, which may also be empty.
 
+    Returns
+    -------
+    shapely geometry of type `kind`
+        In two dimensions. It is not empty, unless `kind` is `BaseGeometry`; whether it is valid is not checked.
+
     Raises
     ------
     ValueError
         The bytes are not WKB of this kind, or too many, or some are left over; or the geometry has rings that are
         not closed, is empty, or has coordinates that are not finite or beyond `FARTHEST_M`.
     """
+    # The checks run from the cheapest to GEOS, and each relies on the ones before.
     if len(data) > MOST_WKB_BYTES:
         raise ValueError(f"has {len(data)} bytes; expected at most {MOST_WKB_BYTES}")
     try:
@@ -121,6 +127,7 @@ def _end_of_rings(data: bytes, position: int, order: str, count: int) -> int:
 
 def _end_of_vertices(data: bytes, position: int, order: str, count: int) -> int:
     end = position + _VERTEX_BYTES * count
+    # `frombuffer` would refuse it too, but speak of buffers.
     if end > len(data):
         raise ValueError(f"is WKB that ends too early: {count} vertices do not fit")
     coordinates = np.frombuffer(data, f"{order}f8", 2 * count, position)
