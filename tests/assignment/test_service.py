@@ -290,7 +290,7 @@ OVERLAPPING = (*SPOTS, HotSpot(name="more", area=box(250, 400, 350, 450), value=
         (
             {"vehicles": (*FLEET, master((0.0, 0.0), name="four")), "share_free": True, "footprint_m": 0.1},
             InvalidMission,
-            r"footprint_m: is 0.1 m; expected 2\.\d+ m or more",
+            r"footprint_m: is 0.1 m; for this water expected 2\.\d+ m or more",
         ),
     ],
 )

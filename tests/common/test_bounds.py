@@ -26,6 +26,7 @@ LENGTHS = {
     "Slave_speed": (LEAST, MOST),
     "Minimal_spatial_rate": (LEAST, MOST),
     "Swath": (LEAST, MOST),
+    "Footprint": (LEAST, FARTHEST),
     "Danger_detour": (0.0, MOST),
     "Safety": (0.0, FARTHEST),
     "Vehicles[1].Length": (LEAST, MOST),

@@ -10,7 +10,7 @@ import shapely
 from shapely import LineString
 
 from oxbow.contracts import ASSIGN, Method, Role, RouteMethod
-from oxbow.errors import Infeasible
+from oxbow.errors import Infeasible, InvalidMission
 from oxbow.geometry.frame import lonlat
 from oxbow.mission.file import MissionType, mission_json, parse_mission
 from oxbow.mission.plan import PlanOptions
@@ -138,6 +138,15 @@ def test_masters_share_the_water_and_keep_to_their_shares(count):
         outside = shapely.get_parts(path.difference(calls.shares[name].buffer(0.01)))
         ends = shapely.MultiPoint([path.coords[0], path.coords[-1]])
         assert all(leg.distance(ends) < 0.1 for leg in outside if leg.length > 0.1)
+
+
+def test_shares_are_made_of_triangles_of_the_footprint():
+    boats_2 = boats("master", 2)
+    coarse, fine = (planned(mission("map", boats_2, Footprint=footprint))[1] for footprint in (300.0, 15.0))
+    corners = [max(map(shapely.get_num_coordinates, calls.shares.values())) for calls in (coarse, fine)]
+    assert corners[1] > 2 * corners[0]
+    with pytest.raises(InvalidMission, match=r"Footprint: is 0.01 m; for this water expected 1\.\d+ m or more"):
+        plan_mission(mission("map", boats_2, Footprint=0.01), OPTIONS, call=local_call())
 
 
 def test_shares_are_in_proportion_to_length_whatever_the_speed():

@@ -117,7 +117,7 @@ class AssignRequest(Message, frozen=True, kw_only=True):
     share_free
         Whether the free space is to be shared among the masters, in proportion to the range that their ways leave.
     footprint_m
-        Edge of the triangles that shares are made of; by default, the stage chooses it.
+        The longest edge of the triangles that shares are made of; by default, the stage chooses it.
     hot_spots
         What the slaves treat.
     swath_m

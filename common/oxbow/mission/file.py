@@ -93,6 +93,7 @@ _JSON_NAMES = {
     "least_width_m": "Least_width",
     "minimal_spatial_rate_m": "Minimal_spatial_rate",
     "swath_m": "Swath",
+    "footprint_m": "Footprint",
     "vehicles": "Vehicles",
     "prior_model": "PriorModel",
     "master_path": "Master_Path",
@@ -113,6 +114,7 @@ _RANGES = dict.fromkeys(_POSITIVE, (LEAST_LENGTH_M, MOST_LENGTH_M)) | {
     "safety_m": (0.0, FARTHEST_M),
     "shore_tolerance_m": (0.0, 10_000.0),
     "least_width_m": (1e-3, 1_000.0),
+    "footprint_m": (LEAST_LENGTH_M, FARTHEST_M),
 }
 """Least and greatest values: a seam of rounding width is never water, and nobody carries a boat for hours."""
 _PARTS: dict[str, tuple[type[msgspec.Struct], bool]] = {
@@ -155,6 +157,9 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
         Least distance between parallel segments of the path; absent: as close as the length allows.
     swath_m
         Width of the water that one pass of a slave treats; absent: the minimal spatial rate.
+    footprint_m
+        What a master's sensor sees at once, edge to edge: the longest edge of the triangles that shares are made
+        of (Balampanis, Maza and Ollero 2016, section IV); absent: a size that suits the water and the fleet.
     vehicles
         Who takes part; absent: one master and one slave, as far as the mission's type needs them.
     prior_model
@@ -183,6 +188,7 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
     least_width_m: float = DEFAULT_LEAST_WIDTH_M
     minimal_spatial_rate_m: float | None = None
     swath_m: float | None = None
+    footprint_m: float | None = None
     vehicles: tuple[GivenVehicle, ...] | None = None
     prior_model: PriorModel | None = None
     master_path: tuple[Position, ...] | None = None

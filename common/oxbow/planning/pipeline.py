@@ -216,10 +216,11 @@ def _shared(task: MissionTask, team: Sequence[Member]) -> Assignment:
         water=task.space.water,
         vehicles=vehicles,
         share_free=True,
+        footprint_m=task.mission.footprint_m,
         seed=task.options.seed,
     )
     fields = {f"vehicle {each.vehicle.name!r}: length_m": each.fields["Master_length"] for each in team}
-    with renamed(fields):
+    with renamed(fields | {"footprint_m": "Footprint"}):
         return task.call(ASSIGN, request)
 
 

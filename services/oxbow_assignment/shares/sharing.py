@@ -134,7 +134,9 @@ def _footprint_m(free: Polygon, masters: int, footprint_m: float | None) -> floa
     if footprint_m is None:
         return _edge_m(free, TRIANGLES * masters)
     if footprint_m < (least_m := _edge_m(free, MOST_TRIANGLES)):
-        raise InvalidMission(f"is {footprint_m:g} m; expected {least_m:.3g} m or more", where="footprint_m")
+        raise InvalidMission(
+            f"is {footprint_m:g} m; for this water expected {least_m:.3g} m or more, or none", where="footprint_m"
+        )
     return footprint_m
 
 
