@@ -48,6 +48,11 @@ def turned(xy: FloatArray, along: FloatArray) -> FloatArray:
         Places, shape (n, 2).
     along
         A unit vector, shape (2,).
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        In metres, about the same origin.
     """
     east, north = along
     return np.asarray(xy @ np.array([[east, -north], [north, east]]))

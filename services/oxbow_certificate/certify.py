@@ -74,6 +74,7 @@ def judge(request: CertifyRequest) -> Judgement:
     cover = cover_radius(space.judged, distance)
     spread = distance_spread(space.judged, distance)
     least_m = least_radius(space.judged.area, paths.length, len(lines))
+    # The true water, not the judged one: rules are about the shore as the mission has it, to a centimetre.
     shore = Shore(space.water, request.safety_m, request.least_width_m)
     danger = Danger(request.danger_zones)
     conducts = [shore.conduct(track.path, track.launch, track.recovery) for track in request.tracks]
@@ -86,6 +87,7 @@ def judge(request: CertifyRequest) -> Judgement:
         **_coverage(cover, spread, least_m),
         **_evenness(request, paths, space, least_m),
         **_kriging(request, paths, spread, least_m),
+        # The caller compares it with its own request: an answer about another path must not pass for this one's.
         request_digest=codec.digest(request),
         tracks=tracks if len(tracks) > 1 else (),
         faults=tuple(

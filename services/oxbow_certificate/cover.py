@@ -59,6 +59,11 @@ def least_radius(area_m2: float, length_m: float, paths: int = 1) -> float:
         The length of all paths together.
     paths
         The number of paths.
+
+    Returns
+    -------
+    float
+        In metres: a bound, which no path quite reaches, since its swaths overlap at every bend.
     """
     return area_m2 / (length_m + math.sqrt(length_m**2 + paths * math.pi * area_m2))
 
@@ -84,9 +89,16 @@ def cover_radius(
     most_squares
         The most squares to examine: before there are more, the search ends with the bounds that it has, farther
         apart than `gap`.
+
+    Returns
+    -------
+    CoverRadius
+        Its bounds are within `gap` of one another, relative, unless the squares ran out; they hold in any case.
     """
     shapely.prepare(region)
+    # The corners of the region give a first lower bound: the worst place is often a bay's end.
     place, low_m = _farthest(shapely.get_coordinates(region), distance)
+    # Places of the path that far apart are few, and raise a bound of `low_m` by no more than 3 %.
     bounds = distance.bounds(low_m / 2)
     squares = Squares.around(region)
     examined = 0
@@ -97,6 +109,7 @@ def cover_radius(
         candidate, candidate_m = _farthest(_nearest_places(region, hopeful), distance)
         if candidate_m > low_m:
             place, low_m = candidate, candidate_m
+        # The bound of all squares together; valid wherever the loop stops.
         high_m = max(low_m * (1 + gap), hopeful_m + squares.circumradius_m)
         # The two distances of a place come from trees in different axes: rounding must not drop a square that the
         # exact one would keep.

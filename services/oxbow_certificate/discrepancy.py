@@ -100,6 +100,7 @@ def unit_square(region: MultiPolygon, places: FloatArray) -> FloatArray:
     # Edges are met from their west end to just before their east end, so that no place at a vertex meets two. The
     # easternmost places are moved in accordingly.
     inner = np.clip(places[:, 0], west[:, 0].min(), np.nextafter(east[:, 0].max(), -np.inf))
+    # Sorted by x, the places that an edge passes over or under are a run, found by two binary searches.
     order = np.argsort(inner, kind="stable")
     x, y = inner[order], places[order, 1]
     # Edge e meets the upright lines of places first[e] <= place < last[e].
@@ -114,6 +115,8 @@ def unit_square(region: MultiPolygon, places: FloatArray) -> FloatArray:
         return np.bincount(place, sign[edge] * of_meetings, minlength=len(x)).astype(np.float64)
 
     chord, south = total(height), total(np.minimum(height, y[place]))
+    # The area west of a place: the trapezoids under all edges that end west of it, and the parts of those that it
+    # meets.
     under = sign * (east[:, 0] - west[:, 0]) * (east[:, 1] + west[:, 1]) / 2
     passed = np.concatenate([[0.0], np.cumsum(under[np.argsort(east[:, 0])])])
     area_west = passed[np.searchsorted(np.sort(east[:, 0]), x, side="right")]

@@ -33,6 +33,7 @@ def directional_evenness(paths: Paths) -> float:
     # Between two cuts the difference falls linearly, from `first` to `last`.
     first, last = share - cuts[:-1], share - cuts[1:]
     mean = np.sum(first**2 - last**2) / 2
+    # Exact for the step function that a path of straight segments has: nothing is sampled.
     watson = np.sum(first**3 - last**3) / 3 - mean**2
     return 1.0 - math.sqrt(min(max(12 * watson, 0.0), 1.0))
 
@@ -49,6 +50,11 @@ def count_turns(path: LineString, reach_m: float) -> int:
         The path.
     reach_m
         The length of path within which changes add up.
+
+    Returns
+    -------
+    int
+        0 for a straight path, and for one of two points.
     """
     steps = _steps(path)
     # Unwrapped, so that changes add up across the cut at +-180 degrees.
@@ -60,8 +66,10 @@ def count_turns(path: LineString, reach_m: float) -> int:
 def _count_left_turns(heading: FloatArray, corner_at: FloatArray, reach_m: float) -> int:
     """How many turns `heading` (n,) makes by growing; `corner_at` (n - 1,) is where along the path it changes."""
     corners = np.arange(len(corner_at))
+    # The growth of the heading since its least value within reach behind, at each corner.
     gathered = heading[1:] - _range_minimum(heading, np.searchsorted(corner_at, corner_at - reach_m), corners)
     turning = corners[(gathered >= TURN_RAD) & (np.diff(heading) > 0)]
+    # Corners of one turn follow one another within the reach: each gap longer than that begins another.
     return int(len(turning) and 1 + np.count_nonzero(np.diff(corner_at[turning]) > reach_m))
 
 

@@ -68,6 +68,11 @@ def kriging_variance(
         How the field varies.
     least_radius_m
         The least cover radius that paths of this length could have over the region; see `least_radius`.
+
+    Returns
+    -------
+    KrigingVariance
+        Fractions of the sill. Far from all samples it is a little more than 1, since the mean is unknown too.
     """
     pitch_m = sampling_pitch(variogram, paths, least_radius_m)
     samples = np.concatenate([sampled(path, pitch_m) for path in shapely.get_parts(paths)])
@@ -88,6 +93,11 @@ def sampling_pitch(variogram: Variogram, paths: Paths, least_radius_m: float) ->
         Where it is sampled, at no more than about `MOST_SAMPLES` positions.
     least_radius_m
         The least cover radius of paths of this length: half the spacing of ideal legs.
+
+    Returns
+    -------
+    float
+        In metres; more where a path is so long that it would have more than `MOST_SAMPLES`.
     """
     return max(min(PITCH * variogram.range_m, least_radius_m), paths.length / MOST_SAMPLES)
 
@@ -101,6 +111,11 @@ def sampled(path: LineString, pitch_m: float) -> FloatArray:
         The path; of positive length.
     pitch_m
         The greatest distance between positions.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        In metres, in the order of the path, at least two.
     """
     xy = shapely.get_coordinates(path)
     at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
@@ -143,9 +158,15 @@ def local_variance(samples: FloatArray, places: FloatArray, variogram: Variogram
         Where it is reconstructed.
     variogram
         How it varies.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Fractions of the sill, in the order of the places.
     """
     tree = KDTree(samples)
     nearest = np.arange(1, min(NEAREST, len(samples)) + 1)
+    # By number along the path, and so by length: the same ones for every place.
     spread = np.linspace(0, len(samples), SPREAD, endpoint=False, dtype=np.intp)
     variances = []
     for chunk in np.split(places, range(_CHUNK, len(places), _CHUNK)):
@@ -178,11 +199,16 @@ def _variance(samples: FloatArray, distance_m: FloatArray, counts: Mask, variogr
     """
     x, y = samples[:, :, 0], samples[:, :, 1]
     apart_m = np.hypot(x[:, :, None] - x[:, None], y[:, :, None] - y[:, None])
+    # A sample that does not count keeps its row, as one of a field of its own: its weight comes out 0, and all
+    # places
+    # have systems of one size, which are solved together.
     among = correlation(variogram, apart_m) * counts[:, :, None] * counts[:, None]
     diagonal = np.arange(samples.shape[1])
     among[:, diagonal, diagonal] = 1.0
     towards = correlation(variogram, distance_m) * counts
     simple, unit = np.moveaxis(np.linalg.solve(among, np.stack([towards, counts], axis=2)), 2, 0)
+    # The unknown mean adds a Lagrange multiplier; eliminated by hand, it takes a second right-hand side and no
+    # more.
     weights = simple + unit * ((1.0 - simple.sum(axis=1)) / unit.sum(axis=1))[:, None]
     # This is the variance of the weights found. The shorter formula, which holds for the best weights alone, could
     # come out negative by rounding.

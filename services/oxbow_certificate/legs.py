@@ -56,6 +56,7 @@ def least_leg_distance(path: LineString, spacing_m: float, excused: BaseGeometry
     excused = shapely.transform(excused, lambda xy: turned(xy, along))
     path = LineString(turned(shapely.get_coordinates(path), along))
     pieces = _Pieces.of(path, max(spacing_m, path.length / _MOST_PIECES))
+    # Excused ends are not measured from; from any other end, the distance to an excused piece still counts.
     asked = np.flatnonzero(~shapely.intersects_xy(excused, pieces.ends))
     # Most paths have legs within one spacing, and a wider search, which takes longer, would find the same.
     for reach in (1.0, REACH):
@@ -78,6 +79,11 @@ def about_ends(free: BaseGeometry, ends: Sequence[Place], margin_m: float) -> Ba
         The launch and recovery points, maybe outside the free space.
     margin_m
         Added to the radius of each disc.
+
+    Returns
+    -------
+    shapely geometry
+        One disc around each end, united.
     """
     points = shapely.points(ends)
     radius_m = margin_m + 1.5 * shapely.distance(points, free)
@@ -136,6 +142,7 @@ class _Pieces:
             (np.abs(np.vecdot(self.along[end % len(self.along)], along)) >= math.cos(PARALLEL_RAD))
             & (ahead_m >= 0)
             & (ahead_m <= self.length_m[piece])
+            # Around a closed path the shorter way counts; for an open one `ring_m` is infinite.
             & (np.minimum(between_m, self.ring_m - between_m) > neighbours_m)
         )
         return np.asarray(np.abs(way[legs, 0] * along[legs, 1] - way[legs, 1] * along[legs, 0]))

@@ -70,6 +70,8 @@ class JudgedSpace:
         free = MultiPolygon(parts)
         asked = _asked(free, request)
         paths = MultiLineString([track.path for track in request.tracks])
+        # Water that cannot be reached would dominate every distance: its share is reported instead, by
+        # `judged_area`.
         entered = [part for part in asked.geoms if part.intersects(paths)]
         entered_area = sum(part.area for part in entered)
         return cls(water, free, asked, MultiPolygon(entered or asked), entered_area / asked.area, detail_m)

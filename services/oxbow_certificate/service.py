@@ -31,6 +31,11 @@ def handle(request: CertifyRequest, show: Show) -> Certificate:
     show
         Takes the layers of the recording.
 
+    Returns
+    -------
+    Certificate
+        That of all paths together.
+
     Raises
     ------
     Infeasible
@@ -41,6 +46,7 @@ def handle(request: CertifyRequest, show: Show) -> Certificate:
     show(_gaps(judgement))
     show(_worst_gap(judgement))
     figures = {name: getattr(judgement.certificate, name) for name in RULES + COVERAGE + EVENNESS}
+    # A layer's figures are numbers: what cannot be computed for this path is left out.
     known = {name: float(figure) for name, figure in figures.items() if figure is not None}
     show(Layer(stage=STAGE, name="figures", kind=LayerKind.SCALARS, scalars=known))
     return judgement.certificate

@@ -51,6 +51,11 @@ def distance_spread(region: MultiPolygon, distance: PathDistance, *, count: int 
         Distance to the path.
     count
         The number of places.
+
+    Returns
+    -------
+    DistanceSpread
+        Of `count` places.
     """
     places = even_places(region, count)
     return DistanceSpread(places, distance(places))
@@ -68,6 +73,11 @@ def even_places(region: MultiPolygon, count: int) -> FloatArray:
         Of positive area.
     count
         The number of places.
+
+    Returns
+    -------
+    ndarray, shape (count, 2)
+        In metres, in the order in which the region's triangles are laid end to end.
     """
     number = np.arange(count)
     return spread(np.column_stack([(number + 0.5) / count, number / _GOLDEN_RATIO % 1.0]), region)

@@ -42,6 +42,8 @@ def require_reachable(parts: Sequence[Polygon], water: Polygon, request: Contour
     """
     safety_m, width_m = request.safety_m, request.least_width_m
     narrow = f"{2 * safety_m:g} m, twice Safety" if 2 * safety_m > width_m else f"{width_m:g} m, Least_width"
+    # Without any basin there is nothing to cut off, but the way to the widest spot may still be too long for a
+    # leg.
     if not is_basin(parts[0], safety_m, width_m):
         _require_near(parts[0], water, request, narrow)
     basins = [parts[0], *(part for part in parts[1:] if is_basin(part, safety_m, width_m))]
@@ -81,6 +83,7 @@ def _first_basin(basins: Sequence[Polygon], routes: Routes, place: Place) -> Pol
     """The basin that is nearest to a place along the water."""
     berth = shapely.shortest_line(routes.water, Point(place)).interpolate(0.0)
     nearest = basins[int(np.argmin(shapely.distance(np.array(basins, dtype=object), berth)))]
+    # Mostly the straight line is in the water, and then no way is shorter: the visibility graph is not needed.
     straight = shapely.shortest_line(berth, nearest)
     if straight.difference(routes.water).length <= ROUNDING_M:
         return nearest

@@ -36,6 +36,11 @@ def erode(water: Sequence[Polygon | MultiPolygon], distance_m: float, excess_m: 
     excess_m
         How much farther away corners of the shore may be kept, as their circles are made of chords. No more than
         0.3 % of the distance in any case, and no less than 0.005 % of it.
+
+    Returns
+    -------
+    list of Polygon
+        None where nothing is left. Parts of one size are ordered by position.
     """
     rings = rings_of(water)
     shore = shapely.union_all(_dilated(rings, distance_m, _chords(distance_m, excess_m)))
@@ -50,8 +55,10 @@ def _dilated(rings: Sequence[FloatArray], distance_m: float, chords: int) -> Geo
     beside long ones: by more than the chords' excess now and then. Such runs are dilated edge by edge.
     """
     runs = np.concatenate([runs_of(ring, RUN) for ring in rings])
+    # Larger by so much that the middles of the chords, too, keep the distance.
     radius_m = distance_m / _nearest(chords)
     bands: GeometryArray = shapely.buffer(runs, radius_m, quad_segs=chords)
+    # Measured rather than trusted: whatever GEOS did to the line, its band must reach the distance all around it.
     is_short = shapely.distance(shapely.boundary(bands), runs) < distance_m
     edges = [runs_of(shapely.get_coordinates(run), 1) for run in runs[is_short]]
     return np.concatenate([bands, *(shapely.buffer(each, radius_m, quad_segs=chords) for each in edges)])

@@ -96,17 +96,22 @@ def erode_water(
     """
     asked_m = default_tolerance_m(safety_m, spacing_m) if tolerance_m is None else tolerance_m
     simplified = simplify(water, asked_m)
+    # Coarser first, where the planner may choose; a tolerance that was asked for is kept.
     while tolerance_m is None and _is_too_long(simplified, spacing_m):
         simplified = simplify(water, 4 * simplified.tolerance_m)
+    # Not after it was made coarser: finer contours would be too long again, and the loop would not end.
     may_refine = simplified.tolerance_m <= asked_m and simplified.points_out <= MANY_POINTS
     while True:
         parts = _shrunk(simplified, safety_m)
         if not parts:
+            # Nothing is left: because there is no room, or only because the contours were simplified too
+            # coarsely.
             if simplified.tolerance_m == 0 or not _has_room(water, safety_m):
                 return Eroded(parts=(), simplified=simplified)
         elif is_safe(parts[0], water, safety_m):
             if not (may_refine and _closes_arms(simplified, parts[0], safety_m, spacing_m)):
                 return Eroded(parts=tuple(parts), simplified=simplified, warnings=_warnings(simplified, asked_m))
+        # Nothing finer is left to try: an unsafe result from the true contours is a fault of this stage.
         elif simplified.tolerance_m == 0:
             raise Internal(f"free space is nearer than {safety_m:g} m to the shore", where="contour")
         simplified = simplify(water, _finer_m(simplified.tolerance_m, spacing_m))
@@ -148,6 +153,7 @@ def _closes_arms(simplified: Simplified, free: Polygon, safety_m: float, spacing
     least_m = safety_m - simplified.tolerance_m
     outer = erode(simplified.parts, least_m, SLACK * simplified.tolerance_m) if least_m > 0 else simplified.parts
     largest = max(outer, key=shapely.area)
+    # A buffer's chords lie inside the true one: at worst, an arm is reported that is none.
     return not free.buffer(REACH * spacing_m).covers(largest)
 
 

@@ -45,6 +45,7 @@ def home_water(waters: Sequence[Polygon], request: ContourRequest, narrows: Base
     """
     if not request.places:
         return waters[0]
+    # All places before any comparison: the first error is then about a place, not about a pair of them.
     nearest = [_nearest(waters, request, index, narrows) for index in range(len(request.places))]
     for index, water in enumerate(nearest):
         _require_no_land_between(water, request, index, narrows)
@@ -82,9 +83,11 @@ def _nearest(waters: Sequence[Polygon], request: ContourRequest, index: int, nar
     nearest = waters[nearest_first[0]]
     if len(waters) == 1:
         return nearest
+    # From the nearest on, and lazily: each test for room takes an inscribed circle, and mostly the first has it.
     roomy = next((number for number in nearest_first if _has_room(waters[number], request.safety_m)), None)
     if roomy is None:
         return nearest
+    # On the shore of both: a place on a pinch between a pocket and the lake belongs to the lake.
     if distance_m[roomy] > least_m + ON_SHORE_M:
         raise _in_a_pocket(nearest, waters[roomy], request, index, narrows)
     return waters[roomy]
@@ -177,5 +180,6 @@ def _has_room(water: Polygon, safety_m: float) -> bool:
     """Whether a circle with the radius of the safety distance fits into a water."""
     if safety_m == 0.0:
         return True
+    # The area first, which rules out most pockets without an inscribed circle.
     is_large = water.area > np.pi * safety_m**2
     return is_large and inscribed_radius_m([water], PRECISION * safety_m) > safety_m

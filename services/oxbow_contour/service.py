@@ -57,6 +57,7 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
     """
     show(Layer(stage="contour", name="raw", geometries=(request.outline, *request.zones)))
     water = MultiPolygon(true_water(request.outline, request.zones))
+    # Narrows are taken out before any water is chosen: what only they connect are two waters.
     opened = _opened(water, request)
     waters = tuple(opened.geoms)
     if not waters:
@@ -64,6 +65,7 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
             f"{request.least_width_m:g} m leaves no water; expected less than the water is wide",
             where="least_width_m",
         )
+    # Then the one water that all vehicles are in, and only that is simplified and eroded.
     home = home_water(waters, request, water.difference(opened))
     eroded = _free_space(home, request, water.area)
     free, *others = eroded.parts
@@ -86,6 +88,7 @@ def _opened(water: MultiPolygon, request: ContourRequest) -> MultiPolygon:
     if 2 * request.safety_m < request.least_width_m or not _are_one_of_each(opened, water):
         return opened
     places = shapely.points(np.reshape(request.places, (-1, 2)))
+    # A place in narrows makes them matter: how far it lies from water that counts is checked next.
     in_narrows = shapely.distance(places, opened) > shapely.distance(places, water) + ON_SHORE_M
     return opened if in_narrows.any() else without_narrows(water, 0.0)
 
@@ -137,6 +140,8 @@ def _require_breadth(parts: Sequence[Polygon], home: Polygon, request: ContourRe
             raise Infeasible("leaves no water wider than rounding errors", where="BoundingBox")
     elif not parts or is_thin(parts[0], width_m):
         radius_m = min(safety_m, inscribed_radius_m([home], EXACT * safety_m))
+        # Half the least width less, so that what is left is no seam; rounded down, so that it works as it is
+        # printed.
         less_m = rounded_down(max((1.0 - EXACT) * radius_m - width_m / 2, 0.0), digits=4)
         narrow = f" wider than {width_m:g} m, Least_width" if width_m else ""
         raise Infeasible(
@@ -158,6 +163,7 @@ def _dropped(part: Polygon, reason: str) -> DroppedPart:
 
 
 def _narrow(water: MultiPolygon, opened: MultiPolygon, request: ContourRequest) -> tuple[str, ...]:
+    # Compared vertex by vertex: water without narrows comes back as it was, in the same order.
     if opened.equals_exact(without_narrows(water, 0.0), tolerance=0.0):
         return ()
     lost_m2 = max(water.area - opened.area, 0.0)

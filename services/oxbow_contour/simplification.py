@@ -59,6 +59,7 @@ def simplify(water: Sequence[Polygon], tolerance_m: float) -> Simplified:
     Simplified
         Valid parts, one for each polygon.
     """
+    # A repeated point would make an edge of length 0, by which `deviations` divides.
     rings = rings_of(shapely.remove_repeated_points(np.array(water, dtype=object)))
     sizes = np.array([len(ring) for ring in rings])
     starts = np.cumsum(sizes) - sizes
@@ -69,6 +70,7 @@ def simplify(water: Sequence[Polygon], tolerance_m: float) -> Simplified:
     closing = starts + sizes - 1
     counts = [1 + len(part.interiors) for part in water]
 
+    # Ends: each round keeps at least one more point, and with all points kept the contours are the true ones.
     while True:
         simple = [points[s : c + 1][is_kept[s : c + 1]] for s, c in zip(starts, closing, strict=True)]
         parts = [Polygon(group[0], group[1:]) for group in _grouped(simple, counts)]
@@ -79,6 +81,7 @@ def simplify(water: Sequence[Polygon], tolerance_m: float) -> Simplified:
             faulty = edges.is_met()
         if not faulty.any():
             break
+        # In the middle by number, so that a strip of n points is split log2 n times at most.
         is_kept[edges.middle[faulty]] = True
 
     return Simplified(
@@ -131,6 +134,7 @@ class _Edges:
         )
         mine, other = STRtree(lines).query(lines[strips], predicate="intersects")
         mine = strips[mine]
+        # Neighbours share a vertex, and so always meet.
         is_foreign = (mine != other) & (self.follower[mine] != other) & (self.follower[other] != mine)
         met = np.zeros(len(lines), dtype=np.bool_)
         met[mine[is_foreign]] = True

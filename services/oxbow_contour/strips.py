@@ -46,6 +46,7 @@ def strip_ends(ring: FloatArray, tolerance_m: float) -> Indices:
     """
     if tolerance_m == 0 or len(ring) <= 4:
         return np.arange(len(ring))
+    # Kept whatever the tolerance, since an island within one strip would otherwise collapse to a line.
     corners = _corners(ring)
     x, y = ring[:, 0].tolist(), ring[:, 1].tolist()
     ends = [0]
@@ -84,6 +85,7 @@ def deviations(points: FloatArray, first: Indices, last: Indices) -> FloatArray:
 def _corners(ring: FloatArray) -> list[int]:
     """The ends of three arcs of a ring: a triangle with an area, which keeps a small ring from collapsing."""
     from_start = ring - ring[0]
+    # The farthest from the start, and the farthest to the side of that line: in line only if the whole ring is.
     far = int(np.argmax((from_start**2).sum(axis=1)))
     along = from_start[far]
     aside = int(np.argmax(np.abs(cross(from_start, along))))
@@ -103,6 +105,7 @@ def _scan(x: list[float], y: list[float], first: int, last: int, tolerance: floa
     for i in range(first + 1, last + 1):
         dx, dy = x[i] - x0, y[i] - y0
         distance = math.sqrt(dx * dx + dy * dy)
+        # The point starts a new strip if it falls back too far behind the farthest one, or lies outside the cone.
         if distance < reach - retreat or not (
             is_open or (right_x * dy >= right_y * dx and left_x * dy <= left_y * dx)
         ):
@@ -112,7 +115,11 @@ def _scan(x: list[float], y: list[float], first: int, last: int, tolerance: floa
             distance = math.sqrt(dx * dx + dy * dy)
             is_open, reach = True, 0.0
         reach = max(reach, distance)
+        # Nearer than the half width, a point is in the strip whatever the direction of the edge, and narrows
+        # nothing.
         if distance > width:
+            # The tangents from the first vertex to the circle about the point, as vectors; no angles, which would
+            # need a cut.
             tangent = math.sqrt(distance * distance - width_squared)
             lx, ly = dx * tangent - dy * width, dy * tangent + dx * width
             rx, ry = dx * tangent + dy * width, dy * tangent - dx * width

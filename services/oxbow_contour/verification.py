@@ -31,7 +31,15 @@ def is_safe(free: Polygon, water: Sequence[Polygon], safety_m: float) -> bool:
         The true water, its parts with disjoint interiors.
     safety_m
         The distance to keep; at 0, `free` may not even touch the contours.
+
+    Returns
+    -------
+    bool
+        True also where it is nearer by no more than rounding.
     """
+    # Three tests together: one point is in the water, no ring of the shore is inside the free space, and no edge
+    # of
+    # either comes near the other. None is enough on its own.
     if not shapely.contains(np.array(water, dtype=object), free.representative_point()).any():
         return False
     shore = rings_of(water)
@@ -71,8 +79,14 @@ def rounded_down(value: float, digits: int = 3) -> float:
         Not negative.
     digits
         How many to keep.
+
+    Returns
+    -------
+    float
+        At most `value`; 0 for 0.
     """
     if value == 0.0:
         return 0.0
     unit = 10.0 ** (math.floor(math.log10(value)) + 1 - digits)
+    # Through text: the product has digits of rounding that a message should not show.
     return float(f"{math.floor(value / unit) * unit:.{digits}g}")

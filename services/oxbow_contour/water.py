@@ -49,4 +49,5 @@ def _are_islands(land: GeometryArray, outline: Polygon) -> bool:
     shapely.prepare(outline)
     if not shapely.contains_properly(outline, land).all() or shapely.get_num_interior_rings(land).any():
         return False
+    # Each island meets itself; any further pair are two that touch or overlap.
     return len(STRtree(land).query(land, predicate="intersects").T) == len(land)

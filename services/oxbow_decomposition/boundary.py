@@ -86,7 +86,9 @@ def _arcs(ring: FloatArray, places: list[FloatArray]) -> list[_Arc]:
     for place in places:
         if not (ring == place).all(axis=1).any():
             ring = np.insert(ring, _nearest_edge(ring, place) + 1, place, axis=0)
+    # Unique, since two rings may touch a third in one place.
     cuts = np.unique([np.flatnonzero((ring == place).all(axis=1))[0] for place in places])
+    # From a cut to the next: no arc then runs over the end of the array.
     ring = np.roll(ring, -cuts[0], axis=0)
     bounds = [*(cuts - cuts[0]).tolist(), len(ring)]
     closed = np.concatenate([ring, ring[:1]])
@@ -108,6 +110,7 @@ def _linked(arcs: list[_Arc]) -> list[FloatArray]:
     while ahead:
         arc = next(iter(ahead))
         walk = []
+        # A walk ends where it began: each arc is the successor of exactly one, so that the arcs form cycles.
         while arc in ahead:
             walk.append(arc.points[:-1])
             arc = ahead.pop(arc)

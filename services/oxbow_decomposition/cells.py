@@ -86,6 +86,7 @@ class _Sweep:
         """Go on to the next critical point; returns its kind."""
         if extreme.minimum:
             kind = self._open(extreme) if extreme.opens else self._split(extreme)
+        # One cell between the two chains closes; two cells, one above and one below, merge.
         elif self.above[extreme.floor] is self.below[extreme.ceiling]:
             kind = self._close(extreme)
         else:
@@ -114,6 +115,7 @@ class _Sweep:
     def _merge(self, at: Extreme) -> CriticalKind:
         lower, upper = self.below[at.ceiling], self.above[at.floor]
         floor_at, ceiling_at = lower.floor.cut_below(at.place), upper.ceiling.cut_above(at.place)
+        # The upper one first: its removal does not change the position of the lower.
         self._end(upper, at.floor.last, ceiling_at)
         position = self._end(lower, floor_at, at.ceiling.last)
         self._begin(position, lower.floor, floor_at, upper.ceiling, ceiling_at)
@@ -121,6 +123,7 @@ class _Sweep:
 
     def _position(self, vertex: Mark) -> int:
         """How many open cells have their middle below a vertex (or level with it)."""
+        # By middles, which are in order even where rounded cuts of neighbours touch.
         return bisect(self.line, vertex.v, key=lambda cell: cell.middle(vertex))
 
     def _begin(self, position: int, floor: Chain, floor_at: Mark, ceiling: Chain, ceiling_at: Mark) -> None:

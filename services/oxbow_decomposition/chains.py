@@ -100,6 +100,11 @@ class Chain:
         ----------
         start, end
             Places on this chain, in its order.
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            In the sweep frame, in metres.
         """
         inner = self.points[start.index : end.index]
         points = np.concatenate([[(start.u, start.v)], inner, [(end.u, end.v)]])
@@ -145,6 +150,7 @@ def extremes(walks: list[FloatArray], heading_rad: float) -> list[Extreme]:
     list of Extreme
         In the order of the sweep, with chains in the sweep frame.
     """
+    # A power of two, so that rounding to it is exact, and the same for every heading of a site.
     grid = 2.0 ** (math.frexp(max(float(np.abs(walk).max()) for walk in walks))[1] - GRID_BITS)
     found = [extreme for walk in walks for extreme in _of_walk(walk, heading_rad, grid)]
     return sorted(found, key=lambda extreme: extreme.order)
@@ -158,6 +164,7 @@ def _of_walk(planar: FloatArray, heading_rad: float, grid: float) -> Iterator[Ex
 
     rising = _rising(compared)
     ends = np.flatnonzero(rising != np.roll(rising, 1))
+    # Minima and maxima alternate; the first is to be a minimum, from which a floor rises.
     ends = ends if rising[ends[0]] else np.roll(ends, 1)
     # Where rounding has put three vertices in line, the planar ones decide, which no rotation has touched.
     turns = _turns(compared, ends[::2])
@@ -189,6 +196,7 @@ def _turns(walk: FloatArray, corners: Indices) -> FloatArray:
     behind, ahead = walk[corners - 1], walk[(corners + 1) % len(walk)]
     (x0, y0), (x1, y1) = (corner - behind).T, (ahead - corner).T
     turns: FloatArray = x0 * y1 - y0 * x1
+    # Exact arithmetic for the few turns whose sign rounding could change: a wrong one opens a cell on land.
     doubtful = np.abs(turns) <= TURN_ERROR * (np.abs(x0 * y1) + np.abs(y0 * x1))
     for number in np.flatnonzero(doubtful):
         (ax, ay), (bx, by), (cx, cy) = (map(Fraction, p[number].tolist()) for p in (behind, corner, ahead))

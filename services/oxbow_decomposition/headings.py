@@ -33,6 +33,11 @@ def scored_headings(free: Polygon, spacing_m: float) -> tuple[HeadingScore, ...]
         A valid polygon in planar metres.
     spacing_m
         Distance between neighbouring transects.
+
+    Returns
+    -------
+    tuple of HeadingScore
+        Their costs in metres of path per square metre of water; the least is the best.
     """
     rings = shapely.get_rings(shapely.simplify(free, DETAIL * spacing_m))
     steps = np.concatenate([np.diff(shapely.get_coordinates(ring), axis=0) for ring in rings])
@@ -54,6 +59,7 @@ def candidate_headings(free: Polygon) -> list[float]:
         [np.diff(shapely.get_coordinates(ring), axis=0) for ring in (free.exterior, *free.interiors)]
     )
     bins = 4 * EVEN_HEADINGS
+    # Weighted by length: a ragged shore has most of its edges, but little of its length, in any one direction.
     length, _ = np.histogram(_headings(steps), bins, (0.0, math.pi), weights=np.hypot(*steps.T))
     along = (np.argsort(-length, kind="stable")[:SHORE_HEADINGS] + 0.5) * math.pi / bins
     return sorted(set(np.concatenate([fan, _headings(rectangle), along]).tolist()))
@@ -85,6 +91,11 @@ def predicted_cost(steps: FloatArray, heading_rad: float, spacing_m: float, area
         Distance between neighbouring transects.
     area_m2
         The water's area.
+
+    Returns
+    -------
+    float
+        In metres of path per square metre of water.
     """
     across_m, along_m = np.abs(to_sweep(steps, heading_rad)).sum(axis=0)
     return float(1 / spacing_m + (ACROSS * across_m + ALONG * along_m) / area_m2)

@@ -35,6 +35,7 @@ def main(argv: list[str] | None = None) -> None:
     options = _options(argv)
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s")
     lifetime = Lifetime(options.parent)
+    # Parts that another recorder is writing now are younger than what is swept.
     sweep(options.folder)
     with ExitStack() as held:
         live = held.enter_context(LiveServer(options.live_port)) if options.live_port else None

@@ -57,11 +57,17 @@ def address_of(key: str, payload: bytes) -> Address:
     payload
         The encoded layer.
 
+    Returns
+    -------
+    Address
+        Its ids are fit for keys and file names.
+
     Raises
     ------
     InvalidMission
         It is no such message or too large, one of its ids is not valid, or the key does not match the message.
     """
+    # Before it is decoded, on the thread that all layers pass through.
     if len(payload) > MOST_LAYER_BYTES:
         raise InvalidMission(f"is {len(payload)} bytes; expected at most {MOST_LAYER_BYTES}", where="layer")
     try:
@@ -70,6 +76,7 @@ def address_of(key: str, payload: bytes) -> Address:
         raise InvalidMission(f"is no layer: {error}", where="layer") from error
     run = Run(mission_id=stamp.mission_id, run_id=stamp.request_id or "run")
     own_key = layer_key(stamp.mission_id, stamp.layer.stage, stamp.layer.name)
+    # Whoever may publish on one key only must not be able to write into the recording of another mission.
     if key != own_key:
         raise InvalidMission(f"was put on another key than its own, {own_key}", where="layer")
     return Address(run=run, is_last=(stamp.layer.stage, stamp.layer.name) in _END)

@@ -98,6 +98,11 @@ def draw(layer: Layer, frame: Frame | None, part: str = "") -> Iterator[Drawn]:
         The site's plane; None where its origin is not known.
     part
         The vehicle or role that the layer is about, where there are several.
+
+    Returns
+    -------
+    iterator of Drawn
+        In the order in which they should be logged; empty for a layer without content.
     """
     within = f"/{rr.escape_entity_path_part(part)}" if part else ""
     entity = f"{layer.stage}/{layer.name}{within}"

@@ -33,6 +33,11 @@ def recording_path(folder: Path, run: Run) -> Path:
     run
         The run.
 
+    Returns
+    -------
+    Path
+        ``FOLDER/{mission}.rrd``.
+
     Raises
     ------
     InvalidMission
@@ -50,6 +55,11 @@ def part_path(folder: Path, run: Run) -> Path:
         Where recordings are kept.
     run
         The run.
+
+    Returns
+    -------
+    Path
+        A hidden file in the same folder, so that finishing it is a rename.
 
     Raises
     ------
@@ -75,6 +85,11 @@ def holds(path: Path, run: Run) -> bool:
         The file, which need not exist.
     run
         The run.
+
+    Returns
+    -------
+    bool
+        False also where there is no file, or it cannot be read.
     """
     try:
         with path.open("rb") as file:
@@ -85,6 +100,7 @@ def holds(path: Path, run: Run) -> bool:
 
 def _within(folder: Path, name: str) -> Path:
     path = folder / name
+    # Ids are checked where they come in; this is the last line, next to the file system.
     if path.parent.resolve() != folder.resolve():
         raise InvalidMission(f"is {name!r}; expected the name of a file", where="recording")
     return path

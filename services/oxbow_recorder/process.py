@@ -39,6 +39,7 @@ def main(argv: list[str]) -> None:
         with Connection(int(fd)) as pipe:
             while True:
                 _follow(msgspec.msgpack.decode(pipe.recv_bytes(), type=ToWriter), recordings)
+                # Also after a failure, which has been logged: the recorder counts what waits by these answers.
                 pipe.send_bytes(_DONE)
     except (EOFError, OSError):
         recordings.close()

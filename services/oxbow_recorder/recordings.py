@@ -94,6 +94,7 @@ class Recording:
         except (OSError, RuntimeError) as error:  # rerun raises RuntimeError, also for a full disk
             _ABANDONED.append(self._file)
             with suppress(OSError):
+                # Half a recording is of no use, and on a full disk its room is.
                 self._part.unlink(missing_ok=True)
             raise Unavailable(f"cannot be written: {error}", where=str(self.path)) from error
 

@@ -163,6 +163,7 @@ class Runs(Closing):
             self._note_refused()
             for recorded in tuple(self._open.values()):
                 self._finish(recorded)
+            # Taken under the lock, ended outside it: to join takes seconds.
             writers, self._writers = self._writers, []
         # All are asked to end before any is waited for, so that they finish side by side.
         for writer in writers:
@@ -180,6 +181,7 @@ class Runs(Closing):
         self._waiting_bytes += len(payload)
         if len(waiting.payloads) > 1 or is_last:
             self._admit(waiting)
+        # The oldest go first: whoever floods the bus with ids pushes out their own.
         while len(self._waiting) > MOST_WAITING or self._waiting_bytes > MOST_WAITING_BYTES:
             self._refused += len(self._leave(next(iter(self._waiting.values()))).payloads)
 
@@ -193,6 +195,7 @@ class Runs(Closing):
         oldest = self._clock() - WAIT_S
         for waiting in tuple(self._waiting.values()):
             is_due = len(waiting.payloads) > 1 or waiting.ended or waiting.since < oldest
+            # Where there is no room for one there is none for the next.
             if is_due and not self._admit(waiting):
                 return
 
@@ -209,6 +212,7 @@ class Runs(Closing):
             self._remember(run)
             self._note_late(run)
             return True
+        # Another run of the same mission ends the one before, whose file it will replace.
         before = self._open.get(run.mission_id) or (self._least() if len(self._open) >= MOST_OPEN else None)
         if before is not None:
             self._finish(before)
@@ -277,8 +281,10 @@ class Runs(Closing):
     def _let_go_of_runs(self) -> None:
         """Finish runs from which nothing comes any more, and forget those that were lost with their process."""
         now = self._clock()
+        # Where processes are scarce, runs that have gone quiet do not keep one to themselves.
         idle_s = IDLE_S if len(self._writers) < MOST_WRITERS else RECENT_S
         for recorded in tuple(self._open.values()):
+            # Its file is lost with it; a later layer of the run begins a new one.
             if recorded.writer.has_died():
                 del self._open[recorded.run.mission_id]
             elif now - recorded.seen > idle_s:

@@ -87,6 +87,7 @@ class Writer:
         bool
             False where too much waits already, and the layer is dropped.
         """
+        # Read without the lock: whoever adds holds the recorder's own, so that it can only shrink meanwhile.
         if self._waiting >= MOST_WAITING or self._waiting_bytes + len(payload) > MOST_WAITING_BYTES:
             return False
         self._put(msgspec.msgpack.encode(Draw(run=run, payload=payload)))
@@ -141,6 +142,7 @@ class Writer:
             self._kill()
 
     def _feed(self) -> None:
+        # Started on this thread and not by the caller, who holds the recorder's lock: a start takes a moment.
         ours, theirs = Pipe()
         with ours:
             with theirs:
