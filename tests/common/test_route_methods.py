@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import dijkstra
 from shapely import LineString, MultiPolygon, Point, Polygon, affinity, box
 
 from oxbow.errors import Infeasible, InvalidMission
+from oxbow.geometry.lattice import RINGS, joined_lattice
 from oxbow.geometry.route import RouteMethod, make_router, visibility
 from oxbow.geometry.route.channel import Channel
 from oxbow.geometry.route.funnel import funnel_line
@@ -19,7 +20,7 @@ from oxbow.geometry.route.incenters import incenters
 from oxbow.geometry.route.mesh import WaterMesh
 from oxbow.geometry.route.network import NetworkRouter
 from oxbow.geometry.route.sights import sights
-from oxbow.geometry.route.tessellation import RINGS, Tessellation, lattice
+from oxbow.geometry.route.tessellation import Tessellation
 from oxbow.geometry.route.visibility import VisibilityGraph
 from oxbow.testing import nasty_polygons
 
@@ -181,7 +182,7 @@ def test_water_that_meets_in_a_point_lets_nobody_through():
 
 @pytest.mark.parametrize(("rings", "error"), [(RINGS[:1], 0.155), (RINGS, 0.015)])
 def test_ways_over_the_open_lattice_err_as_the_report_says(rings, error):
-    places, pairs = lattice(np.zeros(2), np.full(2, 20.0), 1.0, rings)
+    places, pairs = joined_lattice(np.zeros(2), np.full(2, 20.0), 1.0, rings)
     length = np.zeros((len(places), len(places)))
     length[pairs[:, 0], pairs[:, 1]] = np.hypot(*(places[pairs[:, 0]] - places[pairs[:, 1]]).T)
     middle = np.argmin(np.hypot(*(places - 10.0).T))

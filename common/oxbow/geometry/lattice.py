@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import FloatArray, Indices, Place
 
-__all__ = ["lattice_within"]
+__all__ = ["RINGS", "joined_lattice", "lattice_within", "triangular_lattice"]
+
+ROW = math.sqrt(0.75)
+"""How far apart the rows of a lattice of equilateral triangles are, in sides of these."""
+
+RINGS = (
+    ((1, 0), (0, 1), (-1, 1)),
+    ((1, 1), (-1, 2), (-2, 1)),
+    ((2, 1), (1, 2), (-1, 3), (-2, 3), (-3, 2), (-3, 1)),
+)
+"""Half of the neighbours at distances 1, sqrt(3) and sqrt(7), in steps along the row and to the row above (leaning
+right); the other half are their opposites."""
 
 
 def lattice_within(
@@ -44,6 +57,54 @@ def lattice_within(
     return np.column_stack(
         [start[chord] + (first[chord] + number) * pitch_m, origin[1] + row[chord] * row_m],
     )
+
+
+def triangular_lattice(area: BaseGeometry, origin: Place, side_m: float) -> FloatArray:
+    """The places of a lattice of equilateral triangles that lie in an area, shape (n, 2), row by row.
+
+    Parameters
+    ----------
+    area
+        Valid polygons, in metres.
+    origin
+        A place of the lattice; odd rows from there are moved on by half a side.
+    side_m
+        Length of the triangles' sides, which run along x.
+    """
+    return lattice_within(area, origin, side_m, side_m * ROW, shift_m=side_m / 2)
+
+
+def joined_lattice(
+    low: FloatArray, high: FloatArray, side_m: float, rings: tuple[tuple[tuple[int, int], ...], ...] = RINGS
+) -> tuple[FloatArray, Indices]:
+    """A lattice of equilateral triangles over a rectangle, and the pairs of neighbours on some rings.
+
+    Parameters
+    ----------
+    low, high : ndarray, shape (2,)
+        Opposite corners of the rectangle, in metres.
+    side_m
+        Length of the triangles' sides.
+    rings
+        Which neighbours are joined.
+
+    Returns
+    -------
+    places : ndarray, shape (n, 2)
+    pairs : ndarray of int, shape (m, 2)
+    """
+    rows = math.ceil((high[1] - low[1]) / (side_m * ROW)) + 1
+    columns = math.ceil((high[0] - low[0]) / side_m) + 2
+    row, column = np.divmod(np.arange(rows * columns), columns)
+    places = low + side_m * np.column_stack([column - 0.5 * (row % 2), row * ROW])
+    pairs = []
+    for along, up in (step for ring in rings for step in ring):
+        # Odd rows lie half a side to the left.
+        above = row + up
+        beside = column + along + (above % 2 - row % 2 + up) // 2
+        inside = (above < rows) & (beside >= 0) & (beside < columns)
+        pairs.append(np.column_stack([np.arange(len(row)), above * columns + beside])[inside])
+    return places, np.vstack(pairs)
 
 
 def _crossings(area: BaseGeometry, first_row_m: float, row_m: float) -> tuple[Indices, FloatArray]:

@@ -13,7 +13,7 @@ from shapely import Polygon, STRtree
 
 from oxbow.arrays import FloatArray
 from oxbow.contracts import WeightedArea
-from oxbow.geometry.lattice import lattice_within
+from oxbow.geometry.lattice import triangular_lattice
 
 __all__ = ["Samples", "weights_at"]
 
@@ -69,9 +69,7 @@ def _lattice(free: Polygon, pitch_m: float) -> FloatArray:
     cos, sin = math.cos(TILT_RAD), math.sin(TILT_RAD)
     turn = np.array([[cos, sin], [-sin, cos]])
     upright = shapely.transform(free, lambda xy: (xy - middle) @ turn.T)
-    places = lattice_within(
-        upright, (-radius_m, -radius_m), pitch_m, pitch_m * math.sqrt(0.75), shift_m=pitch_m / 2
-    )
+    places = triangular_lattice(upright, (-radius_m, -radius_m), pitch_m)
     return np.asarray(places @ turn + middle)
 
 

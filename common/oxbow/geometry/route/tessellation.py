@@ -21,6 +21,7 @@ from scipy.spatial import KDTree
 
 from oxbow.arrays import FloatArray, Indices
 from oxbow.errors import InvalidMission
+from oxbow.geometry.lattice import joined_lattice
 from oxbow.geometry.route.danger import NO_DANGER, Danger
 from oxbow.geometry.route.mesh import Touches, WaterMesh
 from oxbow.geometry.route.network import Ends, Links, Way
@@ -29,7 +30,7 @@ from oxbow.geometry.route.sights import sights
 from oxbow.geometry.triangles import following
 from oxbow.tolerances import ROUNDING_M
 
-__all__ = ["RINGS", "Tessellation", "lattice"]
+__all__ = ["Tessellation"]
 
 SIDES_ACROSS = 60
 """How many sides of the lattice fit the longer side of the water's bounding box, by default."""
@@ -37,52 +38,11 @@ SIDES_ACROSS = 60
 MOST_SIDES_ACROSS = 1_000
 """The most that may be requested: memory grows with the square, since the lattice fills the box."""
 
-RINGS = (
-    ((1, 0), (0, 1), (-1, 1)),
-    ((1, 1), (-1, 2), (-2, 1)),
-    ((2, 1), (1, 2), (-1, 3), (-2, 3), (-3, 2), (-3, 1)),
-)
-"""Half of the neighbours at distances 1, sqrt(3) and sqrt(7), in steps along the row and to the row above (leaning
-right); the other half are their opposites."""
-
 REACH = math.sqrt(3.0)
 """In sides: obstacle vertices and the ends of routes are joined to the lattice this far away."""
 
 SHORT = 1e-9
 """A line to a vertex of the shore is tested without this share of its end."""
-
-
-def lattice(
-    low: FloatArray, high: FloatArray, side_m: float, rings: tuple[tuple[tuple[int, int], ...], ...] = RINGS
-) -> tuple[FloatArray, Indices]:
-    """A lattice of equilateral triangles over a rectangle, and the pairs of neighbours on some rings.
-
-    Parameters
-    ----------
-    low, high : ndarray, shape (2,)
-        Opposite corners of the rectangle, in metres.
-    side_m
-        Length of the triangles' sides.
-    rings
-        Which neighbours are joined.
-
-    Returns
-    -------
-    places : ndarray, shape (n, 2)
-    pairs : ndarray of int, shape (m, 2)
-    """
-    rows = math.ceil((high[1] - low[1]) / (side_m * math.sqrt(0.75))) + 1
-    columns = math.ceil((high[0] - low[0]) / side_m) + 2
-    row, column = np.divmod(np.arange(rows * columns), columns)
-    places = low + side_m * np.column_stack([column - 0.5 * (row % 2), row * math.sqrt(0.75)])
-    pairs = []
-    for along, up in (step for ring in rings for step in ring):
-        # Odd rows lie half a side to the left.
-        above = row + up
-        beside = column + along + (above % 2 - row % 2 + up) // 2
-        inside = (above < rows) & (beside >= 0) & (beside < columns)
-        pairs.append(np.column_stack([np.arange(len(row)), above * columns + beside])[inside])
-    return places, np.vstack(pairs)
 
 
 class Tessellation:
@@ -151,7 +111,7 @@ class Tessellation:
     @cached_property
     def _lattice(self) -> _Lattice:
         """The lattice in the water."""
-        places, pairs = lattice(self.mesh.points.min(axis=0), self.mesh.points.max(axis=0), self.side_m)
+        places, pairs = joined_lattice(self.mesh.points.min(axis=0), self.mesh.points.max(axis=0), self.side_m)
         touches = self.mesh.holding(places)
         wet = np.unique(touches.place)
         rank = np.full(len(places), -1)

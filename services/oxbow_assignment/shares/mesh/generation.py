@@ -10,7 +10,7 @@ from shapely import Polygon
 
 from oxbow.arrays import FloatArray
 from oxbow.errors import InvalidMission
-from oxbow.geometry.lattice import lattice_within
+from oxbow.geometry.lattice import triangular_lattice
 from oxbow_assignment.shares.mesh.mesh import Mesh
 from oxbow_assignment.shares.mesh.refinement import refined
 from oxbow_assignment.shares.mesh.relaxation import relaxed
@@ -96,8 +96,7 @@ def _lattice(area: Polygon, border: Polygon, pitch_m: float) -> FloatArray:
     turn = np.arctan2(steps[longest, 1], steps[longest, 0])
     along = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
     upright = shapely.transform(area, lambda xy: (xy - ring[longest]) @ along.T)
-    row_m = pitch_m * math.sqrt(0.75)
-    places = lattice_within(upright, (0.0, 0.0), pitch_m, row_m, shift_m=pitch_m / 2)
+    places = triangular_lattice(upright, (0.0, 0.0), pitch_m)
     places = places @ along + ring[longest]
     far = shapely.distance(shapely.points(places), border.boundary) > FROM_BORDER * pitch_m
     return np.asarray(places[far])
