@@ -20,6 +20,7 @@ __all__ = [
     "apexes",
     "cross",
     "doubled_areas",
+    "first_claims",
     "flipped",
     "following",
     "paired",
@@ -163,6 +164,21 @@ def flipped(triangles: Indices, sides: Indices, twins: Indices) -> Indices:
     return triangles
 
 
+def first_claims(triangles: Indices, neighbours: Indices) -> Mask:
+    """Which pairs of a triangle and a neighbour share no triangle with an earlier pair.
+
+    Parameters
+    ----------
+    triangles, neighbours : ndarray of int, shape (k,)
+        Numbers of triangles.
+    """
+    rank = np.arange(len(triangles))
+    first = np.full(max(triangles.max(initial=-1), neighbours.max(initial=-1)) + 1, len(rank))
+    np.minimum.at(first, triangles, rank)
+    np.minimum.at(first, neighbours, rank)
+    return np.asarray((first[triangles] == rank) & (first[neighbours] == rank))
+
+
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """The cross product of plane vectors, over the last axis: positive where b lies to the left of a.
 
@@ -234,16 +250,7 @@ def _without_flats(points: FloatArray, triangles: Indices) -> Indices:
         if len(sides) == 0:
             return triangles
         # Flips of one round are made at once, so that no two of them may share a triangle.
-        sides = sides[_first_claims(sides // 3, twins[sides] // 3)]
+        sides = sides[first_claims(sides // 3, twins[sides] // 3)]
         before = _keys(triangles.ravel()[sides], triangles.ravel()[following(sides)], len(points))
         gone = np.append(gone, before)
         triangles = flipped(triangles, sides, twins[sides])
-
-
-def _first_claims(triangles: Indices, neighbours: Indices) -> Mask:
-    """Which pairs of a triangle and a neighbour share no triangle with an earlier pair."""
-    rank = np.arange(len(triangles))
-    first = np.full(max(triangles.max(), neighbours.max()) + 1, len(rank))
-    np.minimum.at(first, triangles, rank)
-    np.minimum.at(first, neighbours, rank)
-    return np.asarray((first[triangles] == rank) & (first[neighbours] == rank))

@@ -8,7 +8,6 @@ on outwards until everything is constrained Delaunay again.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -18,6 +17,7 @@ from shapely import STRtree
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import FloatArray, Geometries, Indices, Mask
+from oxbow.geometry.flips import legalised
 from oxbow.geometry.route.mesh import WaterMesh
 from oxbow.geometry.triangles import following, paired, triangulated, twins_of
 from oxbow.tolerances import ROUNDING_M
@@ -26,10 +26,6 @@ __all__ = ["GRID_M", "Site", "retriangulated"]
 
 GRID_M = 2.0**-20
 """All vertices lie on a grid this fine (about 1 micrometre), so that a part cut out fits again when put back."""
-
-DELAUNAY_SLACK = 1e-12
-"""How far from one circle four vertices must be for a flip, as the sine of an angle. Without it, rounding could
-make both diagonals of four vertices on one circle look wrong, and flip them for ever."""
 
 
 class Site(Protocol):
@@ -147,41 +143,7 @@ class _Splice:
 
     def legalised(self) -> WaterMesh:
         """The constrained Delaunay triangulation that flips lead to; without vertices that no triangle has."""
-        # A flip renumbers the sides of two triangles. A pending number may denote another side afterwards, but all
-        # four sides around a flip become pending, so that none is missed.
-        pending = self.suspects.tolist()
-        while pending:
-            side = pending.pop()
-            twin = int(self.twins[side])
-            if twin >= 0 and not self._is_delaunay(side, twin):
-                pending += self._flip(side, twin)
+        triangles, twins = legalised(self.points, self.triangles, self.twins, self.suspects)
         used = np.zeros(len(self.points), dtype=np.bool_)
-        used[self.triangles] = True
-        return WaterMesh(self.points[used], (np.cumsum(used) - 1)[self.triangles], self.twins)
-
-    def _is_delaunay(self, side: int, twin: int) -> bool:
-        """Whether the angles opposite a side and its twin come to half a turn at most."""
-        sines, cosines = [], []
-        for t, j in (divmod(side, 3), divmod(twin, 3)):
-            (ax, ay), (bx, by), (cx, cy) = self.points[self.triangles[t, [j, j - 2, j - 1]]].tolist()
-            scale = math.hypot(ax - cx, ay - cy) * math.hypot(bx - cx, by - cy)
-            sines.append(((ax - cx) * (by - cy) - (ay - cy) * (bx - cx)) / scale)
-            cosines.append(((ax - cx) * (bx - cx) + (ay - cy) * (by - cy)) / scale)
-        sine: float = sines[0] * cosines[1] + cosines[0] * sines[1]
-        return sine >= -DELAUNAY_SLACK
-
-    def _flip(self, side: int, twin: int) -> list[int]:
-        """Exchange the diagonal of two triangles' quadrangle; return the four sides around it."""
-        (t, j), (u, k) = divmod(side, 3), divmod(twin, 3)
-        a, b, c = self.triangles[t, [j, j - 2, j - 1]].tolist()
-        d = int(self.triangles[u, k - 1])
-        twins = self.twins.reshape(-1, 3)
-        bc, ca = twins[t, j - 2], twins[t, j - 1]
-        ad, db = twins[u, k - 2], twins[u, k - 1]
-        self.triangles[t], self.triangles[u] = (a, d, c), (d, b, c)
-        twins[t], twins[u] = (ad, 3 * u + 2, ca), (db, bc, 3 * t + 1)
-        around = [3 * t, 3 * t + 2, 3 * u, 3 * u + 1]
-        for outside, inside in zip((ad, ca, db, bc), around, strict=True):
-            if outside >= 0:
-                self.twins[outside] = inside
-        return around
+        used[triangles] = True
+        return WaterMesh(self.points[used], (np.cumsum(used) - 1)[triangles], twins)

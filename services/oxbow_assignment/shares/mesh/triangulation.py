@@ -10,25 +10,17 @@ import shapely
 from shapely import Polygon
 
 from oxbow.arrays import FloatArray, Indices, Mask
+from oxbow.geometry.flips import legalised
 from oxbow.geometry.triangles import (
     apexes,
-    cross,
     doubled_areas,
-    flipped,
     following,
     side_lengths,
     triangulated,
     twins_of,
 )
-from oxbow.tolerances import ROUNDING
 
 __all__ = ["Triangulation"]
-
-FLIP_TOLERANCE = 1e-10
-"""Radians by which the angles opposite a side must exceed pi in sum: below that, a flip would gain nothing."""
-
-MAX_FLIPS = 200
-"""Rounds of flips; without a bound, rounding could make a few sides flip back and forth forever."""
 
 
 @dataclass(frozen=True)
@@ -86,18 +78,8 @@ class Triangulation:
         return on_border
 
     def legalised(self) -> Triangulation:
-        """The constrained Delaunay triangulation of the same points, by Lawson's flips (1977).
-
-        In every round, all sides whose flips do not touch one another are flipped at once.
-        """
-        triangles, twins = self.triangles, self.twins
-        for _ in range(MAX_FLIPS):
-            side = _flippable(self.points, triangles, twins)
-            if len(side) == 0:
-                break
-            triangles = flipped(triangles, side, twins[side])
-            twins = twins_of(triangles)
-        return Triangulation(self.points, triangles)
+        """The constrained Delaunay triangulation of the same points, by flips (`oxbow.geometry.flips`)."""
+        return Triangulation(self.points, legalised(self.points, self.triangles, self.twins)[0])
 
     def located(self, places: FloatArray) -> Indices:
         """The number of a triangle that holds each place, shape (n,); -1 outside the area."""
@@ -145,29 +127,3 @@ class Triangulation:
         triangles = self.triangles.copy()
         triangles[sides // 3] = np.column_stack([tails, new, apex])
         return Triangulation(points, np.vstack([triangles, np.column_stack([new, heads, apex])])).legalised()
-
-
-def _flippable(points: FloatArray, triangles: Indices, twins: Indices) -> Indices:
-    """Sides that break the Delaunay criterion and can be flipped; no two belong to one triangle."""
-    side = np.flatnonzero(twins > np.arange(len(twins)))
-    tail, head = points[triangles.ravel()[side]], points[triangles.ravel()[following(side)]]
-    apex, beyond = points[apexes(triangles, side)], points[apexes(triangles, twins[side])]
-    excess = _angle(tail - apex, head - apex) + _angle(head - beyond, tail - beyond) - np.pi
-    # A flip in a quadrilateral that is not convex would turn a triangle over.
-    least_new = np.minimum(cross(tail - apex, beyond - apex), cross(beyond - apex, head - apex))
-    wrong = (excess > FLIP_TOLERANCE) & (least_new > -ROUNDING * np.ptp(points, axis=0).max() ** 2)
-    side = side[wrong]
-    # The worst side comes first: of the sides of one triangle, only the worst is flipped.
-    order = np.argsort(-excess[wrong], kind="stable")
-    side = side[order]
-    rank = np.full(len(triangles), len(side), dtype=np.intp)
-    numbers = np.arange(len(side))
-    one, other = side // 3, twins[side] // 3
-    np.minimum.at(rank, one, numbers)
-    np.minimum.at(rank, other, numbers)
-    return np.asarray(side[(rank[one] == numbers) & (rank[other] == numbers)])
-
-
-def _angle(a: FloatArray, b: FloatArray) -> FloatArray:
-    """The angle between planar vectors, 0 to pi, shape (n,)."""
-    return np.asarray(np.arctan2(np.abs(cross(a, b)), (a * b).sum(axis=1)))
