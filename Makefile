@@ -38,7 +38,7 @@ pytest: $(READY)
 	$(BIN)/python -m pytest -n auto --dist worksteal
 
 bench: $(READY) ## Measure planning, the bus and the stack; results in out/bench.json.
-	$(BIN)/python tests/bench/run.py
+	$(BIN)/python -m tests.bench
 
 lock: ## Renew requirements.lock: the newest versions that pyproject.toml accepts.
 	rm -rf build/lock

@@ -9,8 +9,6 @@ from statistics import median
 
 import numpy as np
 import shapely
-from lakes import lake
-from results import Figure, Goal, Section, middle
 from scipy.spatial.distance import cdist
 from shapely import Polygon
 
@@ -22,6 +20,8 @@ from oxbow_assignment.targets.assign import Clustering, ClusterMethod, assign, c
 from oxbow_assignment.targets.assignment import TargetAssignment, assignment_of
 from oxbow_assignment.targets.joint import gap_to, is_available, optimise
 from oxbow_assignment.targets.problem import Objective, Problem
+from tests.bench.lakes import lake
+from tests.bench.results import Figure, Goal, Section, middle
 
 __all__ = ["measure"]
 

@@ -10,13 +10,13 @@ from collections.abc import Iterator
 
 import numpy as np
 import shapely
-from cell_paths import coverage_depth, shortest_path, watershed_path
-from results import Figure, Goal, Section
 from shapely import Polygon, box
 
 from oxbow_assignment.shares.mesh import Mesh, mesh_area, propagate
 from oxbow_assignment.shares.mesh.triangulation import Triangulation
 from oxbow_assignment.shares.partition import BALANCE, balanced_partition, wavefront_partition
+from tests.bench.cell_paths import coverage_depth, shortest_path, watershed_path
+from tests.bench.results import Figure, Goal, Section
 
 __all__ = ["measure"]
 

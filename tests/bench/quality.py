@@ -7,20 +7,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bounded import Bounded
-from results import Figure, Goal, Section, middle
-from stages import TimedCall
-
 from oxbow.contracts import CERTIFY, CONTOUR, DECOMPOSE, PATH, Method, Role
 from oxbow.errors import OxbowError
 from oxbow.mission.file import PlanOptions, read_mission
 from oxbow.planning.pipeline import plan_mission
 from oxbow_cli.evaluation import evaluate
 from oxbow_cli.local import local_call
+from tests.bench.bounded import Bounded
+from tests.bench.results import Figure, Goal, Section, middle
+from tests.bench.stages import TimedCall
+from tests.support.project import ROOT
 
 __all__ = ["measure"]
 
-ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "docs" / "examples"
 REAL_LAKES = ROOT.parent / "shared" / "data" / "missions"
 LIMIT_S = 60.0

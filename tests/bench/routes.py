@@ -9,13 +9,13 @@ from statistics import median
 
 import numpy as np
 import shapely
-from lakes import lake
-from results import Figure, Goal, Section
 from shapely import Polygon
 
 from oxbow.arrays import FloatArray
 from oxbow.geometry.frame import Frame, lonlat
 from oxbow.geometry.route import DynamicRouter, RouteMethod, make_router
+from tests.bench.lakes import lake
+from tests.bench.results import Figure, Goal, Section
 
 __all__ = ["measure"]
 

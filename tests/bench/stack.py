@@ -15,8 +15,6 @@ from pathlib import Path
 
 import msgspec
 import psutil
-from lakes import lake
-from results import Figure, Goal, Section, middle
 
 import oxbow
 from oxbow.bus.client import Bus, BusCall
@@ -25,6 +23,8 @@ from oxbow.contracts import ANY, STAGES, MissionKey, MissionState, MissionStatus
 from oxbow.mission.file import Mission, PlanOptions, write_mission
 from oxbow.planning.pipeline import plan_mission
 from oxbow_cli.local import local_call
+from tests.bench.lakes import lake
+from tests.bench.results import Figure, Goal, Section, middle
 
 __all__ = ["measure_bus", "measure_connect", "measure_load", "measure_memory", "measure_start"]
 

@@ -9,15 +9,14 @@ from dataclasses import dataclass, field
 from types import FrameType
 from typing import TypeVar
 
-from bounded import Bounded
-from lakes import lake
-from results import Figure, Section
-
 from oxbow.contracts import STAGES, Call, Endpoint, Message
 from oxbow.errors import OxbowError
 from oxbow.mission.file import Mission, mission_json, parse_mission
 from oxbow.planning.pipeline import plan_mission
 from oxbow_cli.local import local_call
+from tests.bench.bounded import Bounded
+from tests.bench.lakes import lake
+from tests.bench.results import Figure, Section
 
 __all__ = ["TimedCall", "measure"]
 

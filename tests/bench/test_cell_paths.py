@@ -3,14 +3,14 @@
 import networkx as nx
 import numpy as np
 import pytest
-from cell_paths import CellPath, coverage_depth, shortest_path, watershed_path
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from path_requests import lake
 from shapely import box
 
 from oxbow.errors import InvalidMission
 from oxbow_assignment.shares.mesh import Mesh, mesh_area, propagate
+from tests.bench.cell_paths import CellPath, coverage_depth, shortest_path, watershed_path
+from tests.support.path_requests import lake
 
 quick = settings(max_examples=6)
 

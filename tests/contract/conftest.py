@@ -6,10 +6,10 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
-from bus_processes import Replica, end, launch, wait_until
 
 from oxbow.bus.client import Bus, BusCall
 from oxbow.bus.router import RouterProcess, start_router
+from tests.support.bus_processes import Replica, end, launch, wait_until
 
 
 @pytest.fixture(scope="module")

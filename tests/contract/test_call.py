@@ -8,8 +8,6 @@ from collections.abc import Iterator
 
 import pytest
 import shapely
-from bus_processes import end, launch, wait_until
-from echo_stage import ECHO, SQUARE, Deed, EchoRequest, handle
 
 from oxbow.bus.client import Bus, BusCall
 from oxbow.bus.router import RouterProcess
@@ -18,6 +16,8 @@ from oxbow.errors import Infeasible, InvalidMission, OxbowError
 from oxbow.stage.local import LocalCall
 from oxbow.wire import codec
 from oxbow.wire.recording import Layer, Stamped
+from tests.support.bus_processes import end, launch, wait_until
+from tests.support.echo_stage import ECHO, SQUARE, Deed, EchoRequest, handle
 
 pytestmark = pytest.mark.processes
 

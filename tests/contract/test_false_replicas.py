@@ -9,8 +9,6 @@ from contextlib import contextmanager
 
 import msgspec
 import pytest
-from bus_processes import end, launch, wait_until
-from echo_stage import ECHO, SQUARE, Echo, EchoRequest
 
 from oxbow.bus import Envelope
 from oxbow.bus.client import Bus, BusCall
@@ -20,6 +18,8 @@ from oxbow.contracts import Endpoint
 from oxbow.errors import ErrorCode, ErrorReply, Infeasible, Internal, InvalidMission
 from oxbow.wire import codec
 from oxbow.wire.envelope import StageError
+from tests.support.bus_processes import end, launch, wait_until
+from tests.support.echo_stage import ECHO, SQUARE, Echo, EchoRequest
 
 pytestmark = pytest.mark.processes
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 import shapely
-from mutations import mutated
 from shapely import Polygon
 
 from oxbow.contracts import (
@@ -30,6 +29,7 @@ from oxbow.errors import Infeasible, InvalidMission
 from oxbow.wire import codec
 from oxbow.wire.recording import discard
 from oxbow_cli.local import local_call
+from tests.support.mutations import mutated
 
 CHEAP = ("contour", "decomposition", "certificate")
 OUTLINE = Polygon([(0, 0), (60, 0), (70, 30), (40, 55), (0, 50)])

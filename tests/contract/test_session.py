@@ -11,13 +11,13 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from bus_processes import end, launch, run_python, wait_gone, wait_until
-from echo_stage import ECHO, SQUARE, Deed, EchoRequest
 
 from oxbow.bus.client import Bus, BusCall
 from oxbow.bus.router import RouterProcess, free_endpoint, start_router
 from oxbow.contracts import ANY_LAYER, live_key
 from oxbow.errors import Busy, DeadlineExceeded, Infeasible, Internal, InvalidMission, Unavailable
+from tests.support.bus_processes import end, launch, run_python, wait_gone, wait_until
+from tests.support.echo_stage import ECHO, SQUARE, Deed, EchoRequest
 
 pytestmark = pytest.mark.processes
 

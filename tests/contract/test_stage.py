@@ -14,8 +14,6 @@ from pathlib import Path
 import msgspec
 import psutil
 import pytest
-from bus_processes import Replica, end, launch, run_python, wait_gone, wait_until
-from echo_stage import ECHO, SQUARE, Deed, EchoRequest
 
 from oxbow.bus import Envelope
 from oxbow.bus.client import Bus, BusCall
@@ -25,6 +23,8 @@ from oxbow.errors import Busy, DeadlineExceeded, Infeasible, Internal, InvalidMi
 from oxbow.stage import serve_stage
 from oxbow.wire import codec
 from oxbow.wire.introspection import Info, Ping, Stats
+from tests.support.bus_processes import Replica, end, launch, run_python, wait_gone, wait_until
+from tests.support.echo_stage import ECHO, NAMES, SQUARE, Deed, EchoRequest
 
 pytestmark = pytest.mark.processes
 
@@ -194,7 +194,7 @@ def test_a_replica_tells_about_itself(start_replicas: StartReplicas, bus: Bus, c
     pings = [msgspec.json.decode(data, type=Ping) for data in told["ping"].values()]
     assert {ping.pid for ping in pings} == {replica.pid for replica in replicas}
     infos = [msgspec.json.decode(data, type=Info) for data in told["info"].values()]
-    assert {(info.stage, info.handler) for info in infos} == {("echo", "echo_stage:handle")}
+    assert {(info.stage, info.handler) for info in infos} == {("echo", NAMES[1])}
     counts = [msgspec.json.decode(data, type=Stats) for data in told["stats"].values()]
     assert sum(count.served for count in counts) == 1
     assert all(count.session_rss_bytes > 2**20 and count.worker_rss_bytes > 2**20 for count in counts)
@@ -296,7 +296,7 @@ def test_an_option_that_cannot_be_is_refused_by_name(
     option: str, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit):
-        serve_stage("echo_stage:ECHO", "echo_stage:handle", [option])
+        serve_stage(*NAMES, [option])
     assert message in capsys.readouterr().err
 
 
@@ -315,7 +315,7 @@ def test_the_worker_ends_with_its_session_process_even_in_the_middle_of_work(
 
 def test_a_replica_ends_with_its_parent(router: RouterProcess, bus: Bus) -> None:
     parent = run_python(
-        "import bus_processes, sys, time\n"
+        "import sys, time; from tests.support import bus_processes\n"
         "replica = bus_processes.launch(sys.argv[1], 'orphan')\n"
         "print(replica.pid, flush=True)\n"
         "time.sleep(60)",
@@ -334,7 +334,7 @@ def test_a_replica_ends_with_its_parent(router: RouterProcess, bus: Bus) -> None
 def test_a_handler_that_cannot_be_imported_ends_the_replica(router: RouterProcess) -> None:
     program = run_python(
         "import sys; from oxbow.stage import serve_stage\n"
-        "serve_stage('echo_stage:ECHO', 'echo_stage:no_such_handler', ['--connect', sys.argv[1]])",
+        f"serve_stage('{NAMES[0]}', '{NAMES[1]}_of_none', ['--connect', sys.argv[1]])",
         router.endpoint,
     )
     assert program.stdout is not None

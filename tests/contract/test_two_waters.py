@@ -17,8 +17,6 @@ from typing import Any
 import msgspec
 import pytest
 import shapely
-from bus_processes import end, wait_until
-from mutations import mutated
 from shapely import Point, Polygon
 
 from oxbow.bus.client import Bus, BusCall
@@ -29,6 +27,8 @@ from oxbow.wire import codec
 from oxbow.wire.introspection import Info
 from oxbow.wire.recording import discard
 from oxbow_contour.service import handle
+from tests.support.bus_processes import end, wait_until
+from tests.support.mutations import mutated
 
 pytestmark = pytest.mark.processes
 

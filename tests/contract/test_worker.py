@@ -8,12 +8,9 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import msgspec
 import pytest
-from bus_processes import wait_gone, wait_until
-from echo_stage import ECHO, SQUARE, Deed, Echo, EchoRequest
 
 from oxbow.bus import Envelope, Session
 from oxbow.bus.client import Bus
@@ -24,6 +21,9 @@ from oxbow.stage.watch import is_stopped
 from oxbow.stage.wire import Done, Failed, Job, Shown
 from oxbow.stage.worker import Worker, WorkerLost
 from oxbow.wire import codec
+from tests.support.bus_processes import wait_gone, wait_until
+from tests.support.echo_stage import ECHO, NAMES, SQUARE, Deed, Echo, EchoRequest
+from tests.support.project import ROOT
 
 pytestmark = pytest.mark.processes
 
@@ -33,8 +33,8 @@ MEMORY_MB = 600
 @pytest.fixture(scope="module")
 def started() -> Iterator[Worker]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", str(Path(__file__).parent))
-        worker = Worker("echo_stage:ECHO", "echo_stage:handle", "w", MEMORY_MB)
+        patch.setenv("PYTHONPATH", str(ROOT))
+        worker = Worker(*NAMES, "w", MEMORY_MB)
         worker.describe()
         yield worker
         worker.close()
@@ -187,8 +187,8 @@ class Faulty(Worker):
 def test_whatever_is_raised_around_a_worker_is_an_answer(
     router: RouterProcess, bus: Bus, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
-    faulty = Faulty("echo_stage:ECHO", "echo_stage:handle", "faulty", MEMORY_MB)
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    faulty = Faulty(*NAMES, "faulty", MEMORY_MB)
     faulty.pending = (OSError("no handles"), SystemExit(1), KeyboardInterrupt(), BaseException("panic"))
     with Session.connect(router.endpoint) as session:
         stage = Stage(session, faulty, "faulty", 4, on_failure=lambda: None)

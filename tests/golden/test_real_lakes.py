@@ -1,7 +1,6 @@
 """Whole plans, judged: the project's own examples by its certificate, real lakes by an independent judge."""
 
 import json
-from pathlib import Path
 
 import pytest
 
@@ -10,9 +9,9 @@ from oxbow.mission.file import PlanOptions, mission_json, read_mission
 from oxbow.planning.pipeline import plan_mission
 from oxbow_cli.evaluation import evaluate
 from oxbow_cli.local import local_call
-from real_lakes import mission_file, needs_referee, referee
+from tests.support.project import ROOT
+from tests.support.real_lakes import mission_file, needs_referee, referee
 
-ROOT = Path(__file__).parents[2]
 CASES = [
     ("N25.2E089.8", Method.SPACE_FILLING_CURVE, 2.2, 1.25),
     ("N43.9W070.5", Method.SPACE_FILLING_CURVE, 2.2, 1.25),

@@ -1,0 +1,1 @@
+"""Tests of Oxbow: they mirror the packages that they test."""

@@ -1,0 +1,1 @@
+"""Measurements of Oxbow: ``python -m tests.bench``."""

@@ -1,0 +1,1 @@
+"""What tests share: scenes, requests, Mission Files, and processes to be started."""
