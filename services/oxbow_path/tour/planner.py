@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import shapely
-from shapely import LineString, Polygon
+from shapely import LineString
 
 from oxbow.arrays import FloatArray, Indices
-from oxbow.tolerances import ROUNDING_M
 from oxbow_path.task import Task
 from oxbow_path.tour.geodesic import Geodesics, Shore
 from oxbow_path.tour.local_search import shortened
@@ -22,11 +21,10 @@ from oxbow_path.tour.pyvrp_solver import is_installed, polished
 from oxbow_path.tour.sites import clustered, low_discrepancy, with_gaps
 from oxbow_path.tour.solver import Solver, TourSolution
 from oxbow_path.tour.start import first_tour
-from oxbow_path.walk.gaps import branch_to
 from oxbow_path.walk.region import Brush, Circuit, Walk, clear_of_land, simply_connected
 from oxbow_path.walk.remainder import with_remainder
-from oxbow_path.walk.spacing import Budget
-from oxbow_path.walk.trial import Pattern, Trial, Waters, finished
+from oxbow_path.walk.spacing import TURNS, Budget, interpolated
+from oxbow_path.walk.trial import Pattern, Trial, Waters, finished, grown_to_entries
 
 __all__ = ["TourPlan", "TourTrial", "plan_tour"]
 
@@ -35,12 +33,6 @@ EVENNESS = 0.98
 
 Of sites at random it would have 0.7124 (Beardwood, Halton and Hammersley 1959): clustering keeps them apart.
 """
-
-TURNS = 8
-"""Trials before the best so far is taken."""
-
-LEAST_STEP = 0.1
-"""Least share of the way between two known counts that a trial lies from either."""
 
 SAMPLES = 25
 """Low-discrepancy points per site."""
@@ -211,7 +203,10 @@ class _Attempt:
             cut_width_m=2 * lane_m,
             reach_m=pattern.reach_m,
         )
-        reached = Walk(_reaching_entries(walk.region, waters, lane_m), walk.cuts, walk.enclosed)
+        # Together with the region a lane may enclose land, or touch it: both would open the boundary.
+        clear = partial(clear_of_land, free=waters.free)
+        region = grown_to_entries(walk.region, waters, Brush(waters.free, lane_m, 0.0), cleaned=clear)
+        reached = Walk(region, walk.cuts, walk.enclosed)
         return TourTrial(tour, finished(waters, pattern, Circuit((), ()), reached))
 
     def _sites(self, entries: FloatArray, count: int, pitch_m: float) -> FloatArray:
@@ -225,17 +220,6 @@ class _Attempt:
         if geodesics.count < LEAST_SITES:
             return TourSolution(np.arange(geodesics.count), "")
         return self.solver(first_tour(geodesics, near_m), seed=self.seed)
-
-
-def _reaching_entries(region: Polygon, waters: Waters, half_width_m: float) -> Polygon:
-    """The region grown by bands to the entries that a cut has parted it from."""
-    for entry in waters.entries:
-        if not shapely.dwithin(region, entry, ROUNDING_M):
-            goals = waters.routes.goals_in(region)
-            branch = branch_to(shapely.get_coordinates(entry)[0], region, waters.routes, goals, half_width_m)
-            band = Brush(waters.free, half_width_m, 0.0).bands([branch])
-            region = clear_of_land(region.union(band), waters.free)
-    return region
 
 
 def _fitted(attempt: _Attempt, first: int, most: int, budget: Budget) -> tuple[TourTrial, ...]:
@@ -256,9 +240,7 @@ def _next_count(trials: Mapping[int, TourTrial], target_m: float) -> int:
     too_short = [point for point in points if point[0] <= target_m]
     too_long = [point for point in points if point[0] > target_m]
     if too_short and too_long:
-        (short_m, low), (long_m, high) = too_short[-1], too_long[0]
-        share = min(max((target_m - short_m) / (long_m - short_m), LEAST_STEP), 1 - LEAST_STEP)
-        return round((low + share * (high - low)) ** 2)
+        return round(interpolated(too_short[-1], too_long[0], target_m) ** 2)
     length_m, root = (too_short or too_long)[-1 if too_short else 0]
     return round((root * target_m / length_m) ** 2)
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 
 from oxbow.contracts.budget import LENGTH_RESERVE, too_short
 from oxbow.errors import Infeasible
 from oxbow_path.walk.trial import Pattern, Trial
 
-__all__ = ["Budget", "Fit", "fitted"]
+__all__ = ["TURNS", "Budget", "Fit", "fitted", "interpolated"]
 
 ENOUGH = 0.97
 """Share of the longest length that a path should use."""
@@ -19,7 +20,7 @@ TURNS = 8
 """Trials before the best so far is taken."""
 
 LEAST_STEP = 0.1
-"""Least share of the way between two known spacings that a trial lies from either."""
+"""Least share of the way between two known trials that the next one lies from either."""
 
 SENSITIVITY = 1.0
 """Length falls about as the spacing to this power."""
@@ -120,16 +121,29 @@ def _longest(trials: Sequence[Trial], budget: Budget) -> Trial:
 def _next_spacing(trials: Sequence[Trial], budget: Budget) -> float:
     # Length is about a power of the spacing, so that the two are nearly linear in logarithms.
     target = math.log((budget.most_m + budget.enough_m) / 2)
-    points = [(math.log(trial.pattern.spacing_m), math.log(trial.length_m)) for trial in trials]
-    too_small = max((point for point in points if point[1] > target), default=None)
-    too_large = min((point for point in points if point[1] <= target), default=None)
+    points = [(math.log(trial.length_m), math.log(trial.pattern.spacing_m)) for trial in trials]
+    too_small = max((point for point in points if point[0] > target), key=itemgetter(1), default=None)
+    too_large = min((point for point in points if point[0] <= target), key=itemgetter(1), default=None)
     if too_small is not None and too_large is not None:
-        share = (too_small[1] - target) / (too_small[1] - too_large[1])
-        # Interpolation alone may creep towards one end, and length jumps where a transect more fits.
-        share = min(max(share, LEAST_STEP), 1 - LEAST_STEP)
-        return math.exp(too_small[0] + share * (too_large[0] - too_small[0]))
+        return math.exp(interpolated(too_small, too_large, target))
     sensitivity = SENSITIVITY
-    if len(points) > 1 and points[-1][0] != points[-2][0]:
-        seen = (points[-2][1] - points[-1][1]) / (points[-1][0] - points[-2][0])
+    if len(points) > 1 and points[-1][1] != points[-2][1]:
+        seen = (points[-2][0] - points[-1][0]) / (points[-1][1] - points[-2][1])
         sensitivity = min(max(seen, SENSITIVITY / 2), SENSITIVITY * 2)
-    return math.exp(points[-1][0] + (points[-1][1] - target) / sensitivity)
+    return math.exp(points[-1][1] + (points[-1][0] - target) / sensitivity)
+
+
+def interpolated(one: tuple[float, float], other: tuple[float, float], length: float) -> float:
+    """The setting that should give a length, linear between two trials that gave less and more of it.
+
+    Parameters
+    ----------
+    one, other
+        The length of each trial, and the setting that gave it, in whatever measure makes the two about linear.
+    length
+        What is wanted, in the same measure.
+    """
+    share = (length - one[0]) / (other[0] - one[0])
+    # Interpolation alone may creep towards one end, and length jumps where a transect or a site more fits.
+    share = min(max(share, LEAST_STEP), 1 - LEAST_STEP)
+    return one[1] + share * (other[1] - one[1])

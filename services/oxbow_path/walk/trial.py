@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
 import shapely
 from shapely import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import Cell
 from oxbow.geometry.route.gate_routes import Routes
@@ -17,7 +19,7 @@ from oxbow_path.walk.legs import Access, Passable, is_plainly_simple, joined
 from oxbow_path.walk.probe import Probe
 from oxbow_path.walk.region import Brush, Circuit, Walk, clear_of_land, dilated, largest, simply_connected
 
-__all__ = ["Pattern", "Trial", "Waters", "finished", "touches_entries", "walked"]
+__all__ = ["Pattern", "Trial", "Waters", "finished", "grown_to_entries", "touches_entries", "walked"]
 
 TRIM = 0.8
 """Share of the tolerable distance to the shore that a transect stops short of it."""
@@ -127,13 +129,13 @@ def walked(waters: Waters, pattern: Pattern, circuit: Circuit) -> Trial:
     connected = partial(
         simply_connected, free=waters.free, probe=waters.probe, cut_width_m=pattern.cut_m, reach_m=pattern.reach_m
     )
-    walk = connected(_accessible(_started(waters, circuit, brush), waters, brush))
+    walk = connected(grown_to_entries(_started(waters, circuit, brush), waters, brush))
     walk = reach_gaps(walk, brush, waters.probe, waters.routes, reach_m=pattern.reach_m, cut_width_m=pattern.cut_m)
     region = _straightened(walk.region, waters, STRAIGHTENING * pattern.spacing_m)
-    region = connected(_accessible(region, waters, brush)).region
+    region = connected(grown_to_entries(region, waters, brush)).region
     # A cut may have parted an entry from the region. What the region encloses once grown back to it is filled.
     if not touches_entries(region, waters):
-        region = Polygon(_accessible(region, waters, brush).exterior)
+        region = Polygon(grown_to_entries(region, waters, brush).exterior)
     return finished(waters, pattern, circuit, Walk(region, walk.cuts, walk.enclosed))
 
 
@@ -173,7 +175,7 @@ def _smoothed(region: Polygon, waters: Waters, width_m: float) -> Polygon:
     smooth = clear_of_land(region.buffer(width_m).buffer(-2 * width_m).buffer(width_m), waters.free)
     if smooth.is_empty:
         return region
-    return Polygon(_accessible(smooth, waters, Brush(waters.free, width_m, 0.0)).exterior)
+    return Polygon(grown_to_entries(smooth, waters, Brush(waters.free, width_m, 0.0)).exterior)
 
 
 def _started(waters: Waters, circuit: Circuit, brush: Brush) -> Polygon:
@@ -191,14 +193,28 @@ def _straightened(region: Polygon, waters: Waters, tolerance_m: float) -> Polygo
     return clear_of_land(simple.union(region.intersection(kept)), waters.free)
 
 
-def _accessible(region: Polygon, waters: Waters, brush: Brush) -> Polygon:
-    """The region grown to the launch and recovery points' entries."""
+def grown_to_entries(
+    region: Polygon, waters: Waters, brush: Brush, *, cleaned: Callable[[BaseGeometry], Polygon] = largest
+) -> Polygon:
+    """The region grown by bands to the launch and recovery points' entries that it does not touch.
+
+    Parameters
+    ----------
+    region
+        The walk's region.
+    waters
+        The entries, and the ways to them.
+    brush
+        Draws the bands.
+    cleaned
+        Makes one polygon of the region and a band.
+    """
     for entry in waters.entries:
         if not shapely.dwithin(region, entry, ROUNDING_M):
             goals = waters.routes.goals_in(region)
             place = shapely.get_coordinates(entry)[0]
             branch = branch_to(place, region, waters.routes, goals, brush.half_width_m)
-            region = largest(region.union(brush.bands([branch])))
+            region = cleaned(region.union(brush.bands([branch])))
     return region
 
 
