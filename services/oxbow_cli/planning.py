@@ -29,7 +29,7 @@ from oxbow_cli.local import local_call
 from oxbow_cli.scratch import scratch_folder
 from oxbow_cli.stack import StackSettings, running_stack
 
-__all__ = ["Planned", "PlanningJob", "Progress", "plan_embedded", "plan_here", "plan_on"]
+__all__ = ["PlannedMission", "PlanningJob", "Progress", "plan_embedded", "plan_here", "plan_on"]
 
 CONNECT_S = 3.0
 """How long a router and a mission service may take to answer; running ones do so in milliseconds."""
@@ -69,14 +69,14 @@ class PlanningJob:
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedMission:
     """A completed mission, and its recording; None if there is none in reach."""
 
     mission: Mission
     recording: Path | None = None
 
 
-def plan_here(job: PlanningJob) -> Planned:
+def plan_here(job: PlanningJob) -> PlannedMission:
     """Plan in this process, without a bus and without a recording; only from the main thread.
 
     Raises
@@ -88,10 +88,10 @@ def plan_here(job: PlanningJob) -> Planned:
         call = _Reported(local_call(), job.progress, expected_calls(job.mission))
         planned = plan_mission(job.mission, job.options, call=call)
     job.keep(planned)
-    return Planned(planned)
+    return PlannedMission(planned)
 
 
-def plan_on(job: PlanningJob, endpoint: str) -> Planned:
+def plan_on(job: PlanningJob, endpoint: str) -> PlannedMission:
     """Plan on a running stack; its recorder keeps the recording.
 
     Parameters
@@ -118,10 +118,10 @@ def plan_on(job: PlanningJob, endpoint: str) -> Planned:
             **msgspec.structs.asdict(job.options),
         )
     job.keep(planned)
-    return Planned(planned)
+    return PlannedMission(planned)
 
 
-def plan_embedded(job: PlanningJob, recording: Path | None, recordings: Path) -> Planned:
+def plan_embedded(job: PlanningJob, recording: Path | None, recordings: Path) -> PlannedMission:
     """Plan on a stack that is started for this plan and stopped afterwards.
 
     Parameters
@@ -140,7 +140,7 @@ def plan_embedded(job: PlanningJob, recording: Path | None, recordings: Path) ->
         # The recorder has closed its file by now. If it failed, the plan is worth having even so.
         assert planned.plan is not None
         made = scratch / f"{planned.plan.mission_id}.rrd"
-        return Planned(planned, _kept_recording(made, recording or recordings / made.name))
+        return PlannedMission(planned, _kept_recording(made, recording or recordings / made.name))
 
 
 def _kept_recording(made: Path, target: Path) -> Path | None:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from oxbow.mission.plan import PlanRecord
     from oxbow_cli.comparison import Comparison
     from oxbow_cli.evaluation import Evaluation
-    from oxbow_cli.planning import Planned, Progress
+    from oxbow_cli.planning import PlannedMission, Progress
     from oxbow_cli.status import Process, StackStatus
 
 __all__ = [
@@ -72,7 +72,7 @@ def progress_bar(shown: bool) -> Iterator[Progress]:
         yield lambda stage, fraction: bar.update(task, description=stage, completed=fraction)
 
 
-def plan_document(planned: Planned, file: Path) -> dict[str, Any]:
+def plan_document(planned: PlannedMission, file: Path) -> dict[str, Any]:
     """The document that `oxbow plan --json` prints.
 
     Parameters
@@ -85,7 +85,7 @@ def plan_document(planned: Planned, file: Path) -> dict[str, Any]:
     return {"file": file, "recording": planned.recording, "Plan": planned.mission.plan}
 
 
-def print_plan(planned: Planned, file: Path) -> None:
+def print_plan(planned: PlannedMission, file: Path) -> None:
     """Write a plan's table to stdout, and where its files are: one per line, never wrapped, for copying.
 
     Parameters

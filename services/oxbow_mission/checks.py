@@ -11,7 +11,7 @@ from oxbow.errors import Busy, DeadlineExceeded, Internal, InvalidMission, Oxbow
 from oxbow.runtime.closing import Closing
 from oxbow_mission.fair import FairQueue
 from oxbow_mission.helper import Helper, HelperDied, Helpers
-from oxbow_mission.wire import Answer, Ask, Check, Checked, Failed, Show
+from oxbow_mission.wire import Answer, Ask, Check, Checked, HelperFailed, Show
 
 __all__ = ["Checks", "Incoming"]
 
@@ -154,7 +154,7 @@ class _Lane:
                 continue
             if isinstance(outcome, Checked):
                 return outcome
-            if isinstance(outcome, Failed):
+            if isinstance(outcome, HelperFailed):
                 raise outcome.error.error()
             break
         raise Internal("a helper process did not answer what it was asked", where="mission")

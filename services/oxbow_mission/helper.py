@@ -24,8 +24,8 @@ from oxbow_mission.wire import (
     Ask,
     Check,
     Checked,
-    Failed,
     FromHelper,
+    HelperFailed,
     Plan,
     Planned,
     Ready,
@@ -41,7 +41,7 @@ START_S = 30.0
 END_S = 2.0
 MOST_MESSAGE_BYTES = 2**29
 
-Outcome = Checked | Planned | Failed
+Outcome = Checked | Planned | HelperFailed
 
 
 class HelperDied(Internal):
@@ -100,7 +100,7 @@ class Helper(Closing):
 
         Returns
         -------
-        Checked, Planned or Failed
+        Checked, Planned or HelperFailed
             What became of the order.
 
         Raises

@@ -15,7 +15,7 @@ from oxbow.stage.jobs import is_memory_error
 from oxbow.stage.process import guard
 from oxbow.stage.worker import needs_memory
 from oxbow_mission.peer import Handler, HungUp, Peer
-from oxbow_mission.wire import STAGE, Answer, Failed, FromHelper, Ready, ToHelper
+from oxbow_mission.wire import STAGE, Answer, FromHelper, HelperFailed, Ready, ToHelper
 
 _log = logging.getLogger(__name__)
 
@@ -44,12 +44,12 @@ def _outcome(order: ToHelper, handler: Handler, peer: Peer, memory_mb: int) -> F
     except HungUp:
         raise
     except OxbowError as error:
-        return Failed(error=ErrorReply.of(error))
+        return HelperFailed(error=ErrorReply.of(error))
     except BaseException as error:  # noqa: BLE001 - becomes an `internal` error
         if is_memory_error(error):
-            return Failed(error=ErrorReply.of(needs_memory(memory_mb, STAGE)))
+            return HelperFailed(error=ErrorReply.of(needs_memory(memory_mb, STAGE)))
         _log.exception("%s failed", type(order).__name__)
-        return Failed(error=ErrorReply.of(Internal(described(error), where=STAGE)))
+        return HelperFailed(error=ErrorReply.of(Internal(described(error), where=STAGE)))
 
 
 if __name__ == "__main__":

@@ -15,8 +15,8 @@ __all__ = [
     "Ask",
     "Check",
     "Checked",
-    "Failed",
     "FromHelper",
+    "HelperFailed",
     "Plan",
     "Planned",
     "Ready",
@@ -91,7 +91,7 @@ class Planned(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     document: bytes
 
 
-class Failed(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+class HelperFailed(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     """The error that a check or a run ended in."""
 
     error: ErrorReply
@@ -108,8 +108,8 @@ class Said(msgspec.Struct, frozen=True, kw_only=True):
     """What a helper process says, about the order of this number: what is about another is no answer."""
 
     order: int
-    what: Ready | Checked | Ask | Show | Planned | Failed
+    what: Ready | Checked | Ask | Show | Planned | HelperFailed
 
 
 ToHelper = Check | Plan | Answer
-FromHelper = Ready | Checked | Ask | Show | Planned | Failed
+FromHelper = Ready | Checked | Ask | Show | Planned | HelperFailed

@@ -7,7 +7,7 @@ import msgspec
 from oxbow.contracts import checked_id, layer_key
 from oxbow.errors import InvalidMission
 
-__all__ = ["MOST_LAYER_BYTES", "Address", "Run", "address_of"]
+__all__ = ["MOST_LAYER_BYTES", "Address", "RecordedRun", "address_of"]
 
 MOST_LAYER_BYTES = 32 * 2**20
 """Larger layers are dropped: a lake's triangles take a few megabytes."""
@@ -16,7 +16,7 @@ _END = frozenset({("mission", "done"), ("mission", "failed")})
 """Stage and name of a mission's last layer."""
 
 
-class Run(msgspec.Struct, frozen=True, kw_only=True):
+class RecordedRun(msgspec.Struct, frozen=True, kw_only=True):
     """One run of a mission; its ids may stand in a key and in a file's name."""
 
     mission_id: str
@@ -30,7 +30,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
 class Address(msgspec.Struct, frozen=True, kw_only=True):
     """The run that a layer belongs to, and whether it is that run's last."""
 
-    run: Run
+    run: RecordedRun
     is_last: bool
 
 
@@ -74,7 +74,7 @@ def address_of(key: str, payload: bytes) -> Address:
         stamp = msgspec.msgpack.decode(payload, type=_Stamp)
     except (ValueError, RecursionError) as error:  # UnicodeDecodeError is a ValueError, but no DecodeError
         raise InvalidMission(f"is no layer: {error}", where="layer") from error
-    run = Run(mission_id=stamp.mission_id, run_id=stamp.request_id or "run")
+    run = RecordedRun(mission_id=stamp.mission_id, run_id=stamp.request_id or "run")
     own_key = layer_key(stamp.mission_id, stamp.layer.stage, stamp.layer.name)
     # Whoever may publish on one key only must not be able to write into the recording of another mission.
     if key != own_key:

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 from oxbow.errors import InvalidMission
-from oxbow_recorder.address import Run
+from oxbow_recorder.address import RecordedRun
 
 __all__ = ["holds", "part_path", "recording_id", "recording_path", "sweep"]
 
@@ -23,7 +23,7 @@ _PART = re.compile(r"\.[A-Za-z0-9_.-]+\.part\.rrd")
 _log = logging.getLogger("oxbow_recorder")
 
 
-def recording_path(folder: Path, run: Run) -> Path:
+def recording_path(folder: Path, run: RecordedRun) -> Path:
     """Where the recording of a run ends up; an older one of its mission is replaced as a whole.
 
     Parameters
@@ -46,7 +46,7 @@ def recording_path(folder: Path, run: Run) -> Path:
     return _within(folder, f"{run.mission_id}.rrd")
 
 
-def part_path(folder: Path, run: Run) -> Path:
+def part_path(folder: Path, run: RecordedRun) -> Path:
     """Where the recording of a run is written until it is finished.
 
     Parameters
@@ -71,12 +71,12 @@ def part_path(folder: Path, run: Run) -> Path:
     return _within(folder, f".{run.mission_id}.{digest}.part.rrd")
 
 
-def recording_id(run: Run) -> str:
+def recording_id(run: RecordedRun) -> str:
     """The id by which viewers distinguish recordings, found in the head of its file; none is part of another."""
     return f"{run.mission_id} ({run.run_id})"
 
 
-def holds(path: Path, run: Run) -> bool:
+def holds(path: Path, run: RecordedRun) -> bool:
     """Whether there is a recording of this very run, perhaps by another process.
 
     Parameters

@@ -12,7 +12,7 @@ import rerun as rr
 from oxbow.errors import OxbowError, Unavailable
 from oxbow.geometry.frame import Frame
 from oxbow.wire.recording import Stamped
-from oxbow_recorder.address import Run
+from oxbow_recorder.address import RecordedRun
 from oxbow_recorder.blueprint import blueprint
 from oxbow_recorder.drawing import draw
 from oxbow_recorder.files import part_path, recording_id, recording_path
@@ -47,7 +47,7 @@ class Recording:
         The file cannot be written.
     """
 
-    def __init__(self, folder: Path, run: Run, viewers: str | None = None) -> None:
+    def __init__(self, folder: Path, run: RecordedRun, viewers: str | None = None) -> None:
         self.path = recording_path(folder, run)
         self._part = part_path(folder, run)
         self._file = rr.RecordingStream("oxbow", recording_id=recording_id(run))
@@ -123,10 +123,10 @@ class Recordings:
     def __init__(self, folder: Path, viewers: str | None = None) -> None:
         self.folder = folder
         self.viewers = viewers
-        self._open: dict[Run, Recording | None] = {}
+        self._open: dict[RecordedRun, Recording | None] = {}
         """None stands for a recording that could not be begun: its layers have nowhere to go."""
 
-    def add(self, run: Run, stamped: Stamped) -> None:
+    def add(self, run: RecordedRun, stamped: Stamped) -> None:
         """Draw a layer in its run's recording, which the first one begins.
 
         Parameters
@@ -149,7 +149,7 @@ class Recordings:
         if recording is not None:
             recording.add(stamped)
 
-    def finish(self, run: Run) -> None:
+    def finish(self, run: RecordedRun) -> None:
         """Put the recording of a run in its place."""
         recording = self._open.pop(run, None)
         if recording is not None:

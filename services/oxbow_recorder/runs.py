@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from oxbow.runtime.closing import Closing
-from oxbow_recorder.address import Run, address_of
+from oxbow_recorder.address import RecordedRun, address_of
 from oxbow_recorder.files import holds, recording_path
 from oxbow_recorder.vitals import Counts
 from oxbow_recorder.writer import END_S, Writer
@@ -59,7 +59,7 @@ _log = logging.getLogger("oxbow_recorder")
 class _Waiting:
     """A run that is not recorded yet: one of many that have shown a single layer, or one that finds no room."""
 
-    run: Run
+    run: RecordedRun
     since: float
     payloads: list[bytes] = field(default_factory=list)
     size: int = 0
@@ -70,7 +70,7 @@ class _Waiting:
 class _Open:
     """A run that is being recorded."""
 
-    run: Run
+    run: RecordedRun
     writer: Writer
     seen: float
     layers: int = 0
@@ -97,9 +97,9 @@ class Runs(Closing):
         self.viewers = viewers
         self._clock = clock
         self._lock = threading.Lock()
-        self._waiting: dict[Run, _Waiting] = {}
+        self._waiting: dict[RecordedRun, _Waiting] = {}
         self._open: dict[str, _Open] = {}
-        self._over: dict[Run, bool] = {}  # and whether a late layer of it has been mentioned
+        self._over: dict[RecordedRun, bool] = {}  # and whether a late layer of it has been mentioned
         self._finished = self._refused = self._waiting_bytes = 0
         self._used = self._not_before = clock()
         self._current = Writer(folder, viewers)
@@ -173,7 +173,7 @@ class Runs(Closing):
 
     # ----------------------------------------------------------------- waiting
 
-    def _wait(self, run: Run, payload: bytes, is_last: bool) -> None:
+    def _wait(self, run: RecordedRun, payload: bytes, is_last: bool) -> None:
         waiting = self._waiting.setdefault(run, _Waiting(run, self._clock()))
         waiting.payloads.append(payload)
         waiting.size += len(payload)
@@ -252,12 +252,12 @@ class Runs(Closing):
         if recorded.dropped:
             _log.warning("mission %s: %d layers were too many to be recorded", run.mission_id, recorded.dropped)
 
-    def _remember(self, run: Run) -> None:
+    def _remember(self, run: RecordedRun) -> None:
         self._over[run] = False
         if len(self._over) > MOST_REMEMBERED:
             del self._over[next(iter(self._over))]
 
-    def _note_late(self, run: Run) -> None:
+    def _note_late(self, run: RecordedRun) -> None:
         if not self._over[run]:
             self._over[run] = True
             _log.warning("mission %s: layers of run %s came after its end; dropped", run.mission_id, run.run_id)

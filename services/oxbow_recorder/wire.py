@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import msgspec
 
-from oxbow_recorder.address import Run
+from oxbow_recorder.address import RecordedRun
 
-__all__ = ["Draw", "Finish", "ToWriter"]
+__all__ = ["DrawLayer", "Finish", "ToWriter"]
 
 
-class Draw(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+class DrawLayer(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     """A layer to draw, an encoded `oxbow.wire.recording.Stamped`; the first of a run begins its recording."""
 
-    run: Run
+    run: RecordedRun
     payload: bytes
 
 
 class Finish(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     """Put the recording of a run in its place."""
 
-    run: Run
+    run: RecordedRun
 
 
-ToWriter = Draw | Finish
+ToWriter = DrawLayer | Finish

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import msgspec
 
-from oxbow_recorder.address import Run
-from oxbow_recorder.wire import Draw, Finish
+from oxbow_recorder.address import RecordedRun
+from oxbow_recorder.wire import DrawLayer, Finish
 
 __all__ = ["Writer"]
 
@@ -72,7 +72,7 @@ class Writer:
         """The share of the room for waiting layers that is taken."""
         return max(self._waiting_bytes / MOST_WAITING_BYTES, self._waiting / MOST_WAITING)
 
-    def draw(self, run: Run, payload: bytes) -> bool:
+    def draw(self, run: RecordedRun, payload: bytes) -> bool:
         """Have a layer drawn.
 
         Parameters
@@ -90,10 +90,10 @@ class Writer:
         # Read without the lock: whoever adds holds the recorder's own, so that it can only shrink meanwhile.
         if self._waiting >= MOST_WAITING or self._waiting_bytes + len(payload) > MOST_WAITING_BYTES:
             return False
-        self._put(msgspec.msgpack.encode(Draw(run=run, payload=payload)))
+        self._put(msgspec.msgpack.encode(DrawLayer(run=run, payload=payload)))
         return True
 
-    def finish(self, run: Run) -> None:
+    def finish(self, run: RecordedRun) -> None:
         """Have the recording of a run put in its place, when all of its layers are drawn."""
         self._put(msgspec.msgpack.encode(Finish(run=run)))
 

@@ -11,7 +11,7 @@ from oxbow.contracts import layer_key
 from oxbow.errors import InvalidMission
 from oxbow.wire.codec import encode
 from oxbow.wire.recording import Layer, Stamped
-from oxbow_recorder.address import MOST_LAYER_BYTES, Run, address_of
+from oxbow_recorder.address import MOST_LAYER_BYTES, RecordedRun, address_of
 from oxbow_recorder.files import ABANDONED_S, part_path, recording_path, sweep
 
 LONGEST_ID = "m" * 128
@@ -24,7 +24,7 @@ def layer_bytes(mission="m", run="r", stage="path", name="path"):
 
 def test_a_layer_says_whose_it_is():
     address = address_of(layer_key("m", "path", "path"), layer_bytes())
-    assert address.run == Run(mission_id="m", run_id="r")
+    assert address.run == RecordedRun(mission_id="m", run_id="r")
     assert not address.is_last
 
 
@@ -68,14 +68,14 @@ def test_what_is_no_layer_is_refused(payload):
 
 
 def test_the_longest_ids_make_names_that_a_file_system_takes(tmp_path):
-    run = Run(mission_id=LONGEST_ID, run_id=LONGEST_ID)
+    run = RecordedRun(mission_id=LONGEST_ID, run_id=LONGEST_ID)
     for path in (recording_path(tmp_path, run), part_path(tmp_path, run)):
         path.touch()
         assert path.parent == tmp_path
 
 
 def test_runs_of_a_mission_are_written_beside_one_another(tmp_path):
-    parts = {part_path(tmp_path, Run(mission_id="m", run_id=run)) for run in ("r1", "r2")}
+    parts = {part_path(tmp_path, RecordedRun(mission_id="m", run_id=run)) for run in ("r1", "r2")}
     assert len(parts) == 2
 
 

@@ -14,7 +14,7 @@ from oxbow.mission.file import read_mission
 from oxbow.planning.pipeline import plan_mission
 from oxbow.wire.recording import Layer, LayerKind, Stamped
 from oxbow_cli.local import local_call
-from oxbow_recorder.address import Run
+from oxbow_recorder.address import RecordedRun
 from oxbow_recorder.blueprint import blueprint
 from oxbow_recorder.drawing import draw
 from oxbow_recorder.files import holds
@@ -31,14 +31,14 @@ ENTITIES = """
 END = Layer(stage="mission", name="done", kind=LayerKind.LOG, text="done", scalars={"path_s": 1.0})
 
 
-def stamped(layer: Layer, run: Run) -> Stamped:
+def stamped(layer: Layer, run: RecordedRun) -> Stamped:
     ids = {"mission_id": run.mission_id, "request_id": run.run_id}
     return Stamped(**ids, origin=(46.1, 1.9), time_s=1_700_000_000.0, layer=layer)
 
 
 def record(recordings: Recordings, *layers: Layer, run: str = "r1") -> None:
     """Record a run from its first layer to its last."""
-    whose = Run(mission_id="meander", run_id=run)
+    whose = RecordedRun(mission_id="meander", run_id=run)
     for layer in layers:
         recordings.add(whose, stamped(layer, whose))
     recordings.finish(whose)
@@ -160,7 +160,7 @@ def test_missions_at_once_have_a_file_each_and_close_finishes_them(tmp_path):
     recordings = Recordings(tmp_path)
     layer = Layer(stage="path", name="path", geometries=(shapely.LineString([(0, 0), (5, 5)]),))
     for number in range(5):
-        run = Run(mission_id=f"m{number}", run_id="r1")
+        run = RecordedRun(mission_id=f"m{number}", run_id="r1")
         recordings.add(run, stamped(layer, run))
     assert not list(tmp_path.glob("m*.rrd"))
     recordings.close()
@@ -173,7 +173,7 @@ def test_a_recording_says_which_run_it_is_of(tmp_path):
     held = [
         run
         for run in ("r12", "r1", "r123", "r2")
-        if holds(tmp_path / "meander.rrd", Run(mission_id="meander", run_id=run))
+        if holds(tmp_path / "meander.rrd", RecordedRun(mission_id="meander", run_id=run))
     ]
     assert held == ["r12"]
 

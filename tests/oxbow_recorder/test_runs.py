@@ -14,7 +14,7 @@ from oxbow.contracts import layer_key
 from oxbow.wire.codec import encode
 from oxbow.wire.recording import Layer, LayerKind, Stamped
 from oxbow_recorder import runs as runs_module
-from oxbow_recorder.address import Run
+from oxbow_recorder.address import RecordedRun
 from oxbow_recorder.files import holds
 from oxbow_recorder.runs import IDLE_S, MOST_BEGUN, MOST_OPEN, MOST_WAITING, MOST_WRITERS, WAIT_S, Runs
 
@@ -120,7 +120,7 @@ def test_another_run_takes_the_place_of_the_one_before(runs, tmp_path):
         show(runs, run=run, name="second")
     show(runs, run="r1", name="late")
     end(runs, run="r2")
-    until(lambda: holds(tmp_path / "m.rrd", Run(mission_id="m", run_id="r2")))
+    until(lambda: holds(tmp_path / "m.rrd", RecordedRun(mission_id="m", run_id="r2")))
     assert b"/path/late" not in (tmp_path / "m.rrd").read_bytes()
 
 

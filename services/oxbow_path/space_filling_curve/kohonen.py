@@ -13,7 +13,7 @@ from oxbow.arrays import FloatArray
 from oxbow_path.refinement.guard import Guard
 from oxbow_path.refinement.polyline import Polyline
 
-__all__ = ["NODES_PER_SPACING", "Epoch", "Schedule", "organised"]
+__all__ = ["NODES_PER_SPACING", "Epoch", "UpdateSchedule", "organised"]
 
 NODES_PER_SPACING = 1.8
 """Nodes of the first ring, per spacing of the longest path."""
@@ -32,7 +32,7 @@ LEAST_DRAWS = 1e-3
 
 
 @dataclass(frozen=True)
-class Schedule:
+class UpdateSchedule:
     """How often the ring is updated, and how the width of the neighbourhood falls, in nodes."""
 
     epochs: int
@@ -61,7 +61,7 @@ def organised(
     *,
     length_m: float,
     spacing_m: float,
-    schedule: Schedule,
+    schedule: UpdateSchedule,
     stop: Callable[[], bool],
 ) -> Iterator[Epoch]:
     """Update a ring of nodes until it is spread over the draws, epoch by epoch.

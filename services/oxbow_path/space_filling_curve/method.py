@@ -10,7 +10,7 @@ from oxbow.contracts import SpacingStep
 from oxbow_path.improvement import improved
 from oxbow_path.refinement import NODE_WORK, Guard, Polyline, weights_at
 from oxbow_path.space_filling_curve.draws import drawn_places
-from oxbow_path.space_filling_curve.kohonen import NODES_PER_SPACING, Epoch, Schedule, organised
+from oxbow_path.space_filling_curve.kohonen import NODES_PER_SPACING, Epoch, UpdateSchedule, organised
 from oxbow_path.task import SHOWN_EVERY, Display, MethodPlan, Task
 from oxbow_path.walk.pattern import try_transects
 from oxbow_path.walk.remainder import with_remainder
@@ -97,6 +97,6 @@ def _epochs(ring: Polyline, task: Task) -> Iterator[Epoch]:
         Guard.of(task.waters.free, ring, task.spacing_m),
         length_m=task.useful_length_m,
         spacing_m=task.spacing_m,
-        schedule=Schedule(int(np.clip(WORK // work, *EPOCHS))),
+        schedule=UpdateSchedule(int(np.clip(WORK // work, *EPOCHS))),
         stop=task.stop,
     )

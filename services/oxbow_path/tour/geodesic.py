@@ -26,7 +26,7 @@ from oxbow.geometry.route.mesh import Touches, WaterMesh
 from oxbow.geometry.triangles import following
 from oxbow_path.tour.sight import Sight
 
-__all__ = ["Geodesics", "Shore"]
+__all__ = ["Geodesics", "ShoreSights"]
 
 SITES_IN_SIGHT = 12
 """How many of the nearest sites are tried for sight from a site."""
@@ -53,7 +53,7 @@ CHUNK = 256
 """At most this many sites are sources of one search, to bound its memory."""
 
 
-class Shore:
+class ShoreSights:
     """The shore of a polygon of water: its triangulation, and which of its corners see each other nearby.
 
     Where rings touch one another, the water on either side has a corner of its own: no way leads through.

@@ -13,7 +13,7 @@ from shapely import LineString
 
 from oxbow.arrays import FloatArray, Indices
 from oxbow_path.task import Task
-from oxbow_path.tour.geodesic import Geodesics, Shore
+from oxbow_path.tour.geodesic import Geodesics, ShoreSights
 from oxbow_path.tour.local_search import shortened
 from oxbow_path.tour.outline import enclosed
 from oxbow_path.tour.pruning import pruned
@@ -181,8 +181,8 @@ class _Attempt:
         return low_discrepancy(self.waters.free, self.samples_count, seed=self.seed)
 
     @cached_property
-    def _shore(self) -> Shore:
-        return Shore(self.waters.free)
+    def _shore(self) -> ShoreSights:
+        return ShoreSights(self.waters.free)
 
     def tour(self, count: int) -> Tour:
         """A tour of `count` clusters; with none, of the entries alone."""

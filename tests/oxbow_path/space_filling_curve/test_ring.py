@@ -13,7 +13,7 @@ from oxbow.wire.recording import discard
 from oxbow_path.refinement import Guard, Polyline
 from oxbow_path.service import handle
 from oxbow_path.space_filling_curve.draws import cell_draws, drawn_places
-from oxbow_path.space_filling_curve.kohonen import Schedule, organised
+from oxbow_path.space_filling_curve.kohonen import UpdateSchedule, organised
 from tests.support.path_requests import lake, request
 
 quick = settings(max_examples=12)
@@ -82,7 +82,7 @@ def test_every_epoch_keeps_the_ring_inside_and_simple(seed, width):
         Guard.of(water, ring, 160.0),
         length_m=length_m,
         spacing_m=160.0,
-        schedule=Schedule(epochs=8, first_width=width),
+        schedule=UpdateSchedule(epochs=8, first_width=width),
         stop=lambda: False,
     )
     for epoch in epochs:
@@ -103,7 +103,7 @@ def test_nodes_follow_the_length():
         Guard.of(square, ring, 100.0),
         length_m=10_000.0,
         spacing_m=100.0,
-        schedule=Schedule(epochs=40),
+        schedule=UpdateSchedule(epochs=40),
         stop=lambda: False,
     )
     assert 0.8 * 10_000.0 <= last.ring.length_m <= 1.2 * 10_000.0

@@ -15,7 +15,7 @@ from oxbow.contracts import PathRequest
 from oxbow.errors import Infeasible
 from oxbow.testing import nasty_polygons
 from oxbow_path.task import Task
-from oxbow_path.tour.geodesic import Shore
+from oxbow_path.tour.geodesic import ShoreSights
 from oxbow_path.tour.local_search import shortened
 from oxbow_path.tour.outline import enclosed
 from oxbow_path.tour.planner import TourPlan, plan_tour
@@ -40,7 +40,7 @@ SOLVERS = [
 
 def random_start(seed: int, count: int, free: Polygon = SQUARE, near_m: float = 1e4) -> Start:
     sites = low_discrepancy(free, count, seed=seed)
-    return first_tour(Shore(free).geodesics(sites), near_m)
+    return first_tour(ShoreSights(free).geodesics(sites), near_m)
 
 
 # --------------------------------------------------------------------------- sites
@@ -92,7 +92,7 @@ def test_gaps_are_closed_and_nothing_else_is_added():
 def test_geodesic_distances_are_those_of_ways_inside_and_no_shorter_than_straight(name):
     water = NASTY[name]
     sites = clustered(low_discrepancy(water, 600, seed=2), 40, water)
-    geodesics = Shore(water).geodesics(sites)
+    geodesics = ShoreSights(water).geodesics(sites)
     distance = np.array([geodesics.from_site(site) for site in range(len(sites))])
     assert np.isfinite(distance).all()
     assert distance == pytest.approx(distance.T)
@@ -106,7 +106,7 @@ def test_geodesic_distances_are_those_of_ways_inside_and_no_shorter_than_straigh
 
 
 def test_a_geodesic_turns_at_the_corners_of_the_shore():
-    geodesics = Shore(HORSESHOE).geodesics(np.array([[10.0, 0.0], [90.0, 0.0]]))
+    geodesics = ShoreSights(HORSESHOE).geodesics(np.array([[10.0, 0.0], [90.0, 0.0]]))
     expected = math.hypot(10, 90) * 2 + 60
     assert geodesics.from_site(0)[1] == pytest.approx(expected)
     assert LineString(geodesics.way([0, 1])).length == pytest.approx(2 * expected)
@@ -116,7 +116,7 @@ def test_a_geodesic_turns_at_the_corners_of_the_shore():
 @given(seed=st.integers(0, 1000))
 def test_the_spanning_tree_is_that_of_all_distances(seed):
     sites = low_discrepancy(HORSESHOE, 30, seed=seed)
-    geodesics = Shore(HORSESHOE).geodesics(sites)
+    geodesics = ShoreSights(HORSESHOE).geodesics(sites)
     distance = np.array([geodesics.from_site(site) for site in range(30)])
     joined, length = {0}, 0.0
     while len(joined) < 30:
@@ -133,7 +133,7 @@ def test_the_spanning_tree_is_that_of_all_distances(seed):
 @pytest.mark.parametrize("name", sorted(NASTY))
 def test_the_first_tour_passes_three_legs_of_the_tree_at_most(name):
     water = NASTY[name]
-    geodesics = Shore(water).geodesics(clustered(low_discrepancy(water, 400, seed=3), 40, water))
+    geodesics = ShoreSights(water).geodesics(clustered(low_discrepancy(water, 400, seed=3), 40, water))
     start = first_tour(geodesics, 10.0)
     assert sorted(start.order) == list(range(geodesics.count))
     legs = np.asarray(start.distances[start.order, np.roll(start.order, -1)])
@@ -185,7 +185,7 @@ def test_no_exchange_of_two_legs_shortens_a_tour(seed):
 
 def test_a_tour_of_even_sites_has_about_the_length_that_the_first_count_expects():
     sites = clustered(low_discrepancy(SQUARE, 10_000, seed=0), 400, SQUARE)
-    start = first_tour(Shore(SQUARE).geodesics(sites), 20.0)
+    start = first_tour(ShoreSights(SQUARE).geodesics(sites), 20.0)
     length = start.length_m(shortened(start, seed=0).order)
     assert length == pytest.approx(0.98 * math.sqrt(400 * SQUARE.area), rel=0.04)
 
@@ -193,7 +193,7 @@ def test_a_tour_of_even_sites_has_about_the_length_that_the_first_count_expects(
 def test_pruning_keeps_the_entries_and_shortens_arms_alike():
     comb = shapely.union_all([box(0, 0, 100, 10), *(box(x, 0, x + 2, 90) for x in (10, 50, 88))])
     sites = np.array([[5.0, 5.0], *([x + 1.0, y] for x in (10, 50, 88) for y in range(5, 90, 5)), [99.0, 5.0]])
-    geodesics = Shore(comb).geodesics(sites)
+    geodesics = ShoreSights(comb).geodesics(sites)
     order = shortened(first_tour(geodesics, 50.0), seed=0).order
     length = LineString(geodesics.way(order)).length
     left = pruned(order, geodesics, kept=1, length_m=0.7 * length)
@@ -278,7 +278,7 @@ def test_a_slit_round_an_island_is_slit_and_one_that_leaves_nothing_is_not():
 @given(seed=st.integers(0, 10_000), count=st.integers(2, 40))
 def test_the_outline_of_a_tour_in_random_order_is_sound(seed, count):
     order = np.random.default_rng(seed).permutation(count)
-    way = Shore(HORSESHOE).geodesics(low_discrepancy(HORSESHOE, count, seed=seed)).way(order)
+    way = ShoreSights(HORSESHOE).geodesics(low_discrepancy(HORSESHOE, count, seed=seed)).way(order)
     region = enclosed(way, HORSESHOE, 0.5)
     assert region.is_valid
     assert HORSESHOE.buffer(1e-6).covers(region)
@@ -289,7 +289,7 @@ def test_the_outline_of_a_tour_in_random_order_is_sound(seed, count):
 @given(seed=st.integers(0, 10_000), count=st.integers(4, 60))
 def test_the_outline_of_a_tour_passes_all_of_it(name, seed, count):
     water = NASTY[name]
-    geodesics = Shore(water).geodesics(low_discrepancy(water, count, seed=seed))
+    geodesics = ShoreSights(water).geodesics(low_discrepancy(water, count, seed=seed))
     way = geodesics.way(shortened(first_tour(geodesics, 100.0), seed=0).order)
     region = enclosed(way, water, 0.3)
     assert region.buffer(0.6).covers(LineString(way))

@@ -130,7 +130,7 @@ class DynamicRouter:
         changed = shapely.union(self._obstacles.get(name, Polygon()), area, grid_size=GRID_M)
         if not area.is_empty:
             obstacles[name] = area
-        mesh = retriangulated(self.mesh, changed, _Site(self._open_water, tuple(obstacles.values())))
+        mesh = retriangulated(self.mesh, changed, _ObstructedWater(self._open_water, tuple(obstacles.values())))
         if not len(mesh.triangles):
             raise Infeasible("covers all the water that is left", where=name)
         # Only now, so that a refusal leaves everything as it was. The router belongs to the mesh before.
@@ -140,7 +140,7 @@ class DynamicRouter:
 
 
 @dataclass(frozen=True)
-class _Site:
+class _ObstructedWater:
     """Open water with obstacles in it."""
 
     open_water: WaterMesh

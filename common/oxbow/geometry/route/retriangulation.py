@@ -22,13 +22,13 @@ from oxbow.geometry.route.mesh import WaterMesh
 from oxbow.geometry.triangles import following, paired, triangulated, twins_of
 from oxbow.tolerances import ROUNDING_M
 
-__all__ = ["GRID_M", "Site", "retriangulated"]
+__all__ = ["GRID_M", "ChangedWater", "retriangulated"]
 
 GRID_M = 2.0**-20
 """All vertices lie on a grid this fine (about 1 micrometre), so that a part cut out fits again when put back."""
 
 
-class Site(Protocol):
+class ChangedWater(Protocol):
     """The water as it should be after a change."""
 
     def shores_near(self, areas: Geometries) -> Geometries:
@@ -38,7 +38,7 @@ class Site(Protocol):
         """Whether places, shape (n, 2), are in the water."""
 
 
-def retriangulated(mesh: WaterMesh, changed: BaseGeometry, site: Site) -> WaterMesh:
+def retriangulated(mesh: WaterMesh, changed: BaseGeometry, water: ChangedWater) -> WaterMesh:
     """The mesh after a change.
 
     Parameters
@@ -47,12 +47,12 @@ def retriangulated(mesh: WaterMesh, changed: BaseGeometry, site: Site) -> WaterM
         The water before, on the grid.
     changed
         Where water has appeared or disappeared; on the grid.
-    site
+    water
         The water afterwards, which differs only there.
     """
     cavity = _touched(mesh, changed)
     while True:
-        faces = _hole(mesh, cavity, changed, site)
+        faces = _hole(mesh, cavity, changed, water)
         splice, loose = _spliced(mesh, cavity, faces)
         if not len(loose):
             return splice.legalised()
@@ -60,7 +60,7 @@ def retriangulated(mesh: WaterMesh, changed: BaseGeometry, site: Site) -> WaterM
         cavity = np.union1d(cavity, loose)
 
 
-def _hole(mesh: WaterMesh, cavity: Indices, changed: BaseGeometry, site: Site) -> Geometries:
+def _hole(mesh: WaterMesh, cavity: Indices, changed: BaseGeometry, water: ChangedWater) -> Geometries:
     """The water of a cavity after the change, as polygons.
 
     All lines are noded together, with the shores as they were given, not as earlier changes cut them: what
@@ -69,16 +69,16 @@ def _hole(mesh: WaterMesh, cavity: Indices, changed: BaseGeometry, site: Site) -
     pieces = np.asarray(shapely.polygons(mesh.corners[cavity]))
     border = mesh.twins.reshape(-1, 3)[cavity].ravel()
     border = border[(border >= 0) & ~np.isin(border // 3, cavity)]
-    # Sides that were shore are not among them: the shores of after the change come from the site.
+    # Sides that were shore are not among them: the shores of after the change come from the water as it is then.
     ends = np.stack([mesh.tails[border], mesh.heads[border]], axis=1)
     parts = shapely.get_parts(shapely.geometrycollections([changed, *pieces]))
-    lines = np.concatenate([shapely.linestrings(ends), site.shores_near(parts)])
+    lines = np.concatenate([shapely.linestrings(ends), water.shores_near(parts)])
     noded = shapely.union_all(lines, grid_size=GRID_M)
     faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
     middles = shapely.point_on_surface(faces)
     inside = np.zeros(len(faces), dtype=np.bool_)
     inside[STRtree(middles).query(parts, predicate="intersects")[1]] = True
-    inside[inside] = site.is_water(shapely.get_coordinates(middles[inside]))
+    inside[inside] = water.is_water(shapely.get_coordinates(middles[inside]))
     return np.asarray(faces[inside])
 
 
