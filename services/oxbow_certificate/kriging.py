@@ -200,8 +200,7 @@ def _variance(samples: FloatArray, distance_m: FloatArray, counts: Mask, variogr
     x, y = samples[:, :, 0], samples[:, :, 1]
     apart_m = np.hypot(x[:, :, None] - x[:, None], y[:, :, None] - y[:, None])
     # A sample that does not count keeps its row, as one of a field of its own: its weight comes out 0, and all
-    # places
-    # have systems of one size, which are solved together.
+    # places have systems of one size, which are solved together.
     among = correlation(variogram, apart_m) * counts[:, :, None] * counts[:, None]
     diagonal = np.arange(samples.shape[1])
     among[:, diagonal, diagonal] = 1.0

@@ -104,8 +104,7 @@ def erode_water(
     while True:
         parts = _shrunk(simplified, safety_m)
         if not parts:
-            # Nothing is left: because there is no room, or only because the contours were simplified too
-            # coarsely.
+            # Nothing is left: because there is no room, or only because the contours were simplified too coarsely.
             if simplified.tolerance_m == 0 or not _has_room(water, safety_m):
                 return Eroded(parts=(), simplified=simplified)
         elif is_safe(parts[0], water, safety_m):

@@ -38,8 +38,7 @@ def is_safe(free: Polygon, water: Sequence[Polygon], safety_m: float) -> bool:
         True also where it is nearer by no more than rounding.
     """
     # Three tests together: one point is in the water, no ring of the shore is inside the free space, and no edge
-    # of
-    # either comes near the other. None is enough on its own.
+    # of either comes near the other. None is enough on its own.
     if not shapely.contains(np.array(water, dtype=object), free.representative_point()).any():
         return False
     shore = rings_of(water)

@@ -35,10 +35,16 @@ def dropped_parts(path: LineString, free: Polygon, reach_m: float, *, is_spent: 
         What is nearer counts as seen.
     is_spent
         Whether the path uses the length that there is: the reason that is given depends on it.
+
+    Returns
+    -------
+    tuple of DroppedPart
+        Empty where all water of account is within reach.
     """
     why = SPENT if is_spent else UNREACHED
     coarse = path.simplify(DETAIL * reach_m)
     rest = shapely.get_parts(free.difference(coarse.buffer(reach_m, quad_segs=QUAD_SEGS)))
+    # A long thin arm has little area, and is missed all the same.
     is_arm = shapely.minimum_bounding_radius(rest) > reach_m / 2
     rest = rest[is_arm | (shapely.area(rest) > LEAST_SHARE * reach_m**2)]
     return tuple(

@@ -55,6 +55,11 @@ def method_plan(path: LineString, fit: Fit) -> MethodPlan:
         What the chosen trial became when it was refined.
     fit
         The chosen trial, and all others.
+
+    Returns
+    -------
+    MethodPlan
+        With the spacing and reach of the chosen pattern, and all that were tried as its steps.
     """
     chosen = fit.chosen.pattern
     return MethodPlan(path, chosen.spacing_m, chosen.reach_m, spacing_steps(fit.trials))

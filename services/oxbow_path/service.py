@@ -64,6 +64,18 @@ def planned(request: PathRequest, stop: Stop, show: Show) -> PathPlan:
         Whether time is up; it replaces the request's time limit.
     show
         Receives the layers of the method, and the path.
+
+    Returns
+    -------
+    PathPlan
+        In the planar frame, from the launch to the recovery point exactly.
+
+    Raises
+    ------
+    Infeasible
+        No path is short enough, or no water leads from a point to the free space.
+    Internal
+        The path broke a rule: a fault of the planner.
     """
     task = Task.of(request, stop)
     display = Display(show, request.decomposition.heading_rad)
@@ -72,6 +84,7 @@ def planned(request: PathRequest, stop: Stop, show: Show) -> PathPlan:
     found = _smoothed(plan.path, task) if request.smooth else plan.path
     display.lines("path", [found])
     path = _from_launch_to_recovery(shapely.transform(found, display.back), request)
+    # After the last change to the path: turned back, and with its ends set.
     require_conforming(path, request)
     return PathPlan(
         path=path,

@@ -90,6 +90,11 @@ class Task:
         stop
             Whether time is up.
 
+        Returns
+        -------
+        Task
+            Its samples and areas are computed when a method first asks for them.
+
         Raises
         ------
         Infeasible
@@ -242,9 +247,15 @@ def prepared_waters(request: PathRequest, spacing_m: float) -> Waters:
         What is asked, in the planar frame.
     spacing_m
         The nominal spacing, which scales the pitch of the probe and the detail of routes.
+
+    Returns
+    -------
+    Waters
+        With the legs of launch and recovery, a probe, and routes through the free space.
     """
     turn = partial(to_sweep, heading_rad=request.decomposition.heading_rad)
     free, water = (shapely.transform(polygon, turn) for polygon in (request.space.free, request.space.water))
+    # Prepared once: the same polygons are asked thousands of times by every method.
     shapely.prepare([free, water])
     shore = leg_routes(free, water)
     (launch, recovery) = turn(np.array([request.launch, request.recovery]))
@@ -254,6 +265,8 @@ def prepared_waters(request: PathRequest, spacing_m: float) -> Waters:
         free=free,
         passable=Passable(free),
         probe=Probe.over(free, _pitch_m(free, PROBE_PITCH * spacing_m)),
+        # Routes as fine as the probe; in canals, whose shore is long for their area, no finer than the gates
+        # allow.
         routes=Routes(free, max(PROBE_PITCH * spacing_m, free.length / GATES_ALONG)),
         launch=access(tuple(launch), free, shore, where="LaunchPoint"),
         recovery=access(tuple(recovery), free, shore, where="RecoveryPoint"),

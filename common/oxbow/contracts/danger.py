@@ -62,6 +62,5 @@ class DangerZone(Message, frozen=True, kw_only=True):
     @property
     def hazard(self) -> float:
         """-log(1 - probability): hazards add up where probabilities of no harm multiply."""
-        # Not log(1 - p), which is 0 for probabilities below 1e-16: a zone of small danger per metre would be
-        # free.
+        # Not log(1 - p), which is 0 for probabilities below 1e-16: a zone of small danger per metre would be free.
         return -math.log1p(-self.probability)

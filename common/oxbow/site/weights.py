@@ -118,8 +118,7 @@ class _Weighted:
         pairs = STRtree(self.areas).query(self.areas)
         lower, upper = pairs[:, pairs[1] > pairs[0]]
         # Areas that only touch, as cells of a raster do, leave one another whole: a difference would cost time,
-        # and add
-        # vertices along their common sides.
+        # and add vertices along their common sides.
         covers = shapely.relate_pattern(self.areas[lower], self.areas[upper], INTERIORS_MEET)
         lower, upper = lower[covers], upper[covers]
         areas = self.areas.copy()

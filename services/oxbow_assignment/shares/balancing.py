@@ -44,6 +44,11 @@ def imbalance(areas_m2: FloatArray, due_m2: FloatArray) -> float:
         The area of every share, shape (k,).
     due_m2
         The area due to every share, > 0, shape (k,).
+
+    Returns
+    -------
+    float
+        0 where all have what is due.
     """
     return float(np.abs(areas_m2 / due_m2 - 1.0).max())
 
@@ -59,6 +64,11 @@ def border_lengths_m(mesh: Mesh, share: Indices, count: int) -> FloatArray:
         The share of every triangle, 0 to `count` - 1, shape (m,).
     count
         The number of shares.
+
+    Returns
+    -------
+    ndarray of float, shape (count, count)
+        In metres; 0 where two shares do not touch, and on the diagonal.
     """
     triangle, side = np.nonzero((mesh.neighbours >= 0) & (share[mesh.neighbours] != share[:, None]))
     lengths = np.zeros((count, count))
@@ -117,6 +127,7 @@ def _transfers(
     """
     lengths = border_lengths_m(mesh, share, len(surplus_m2))
     neighbours: nx.Graph[int] = nx.from_numpy_array(lengths)
+    # Along the longest borders: there a transfer changes the shapes least.
     tree = nx.maximum_spanning_tree(neighbours)
     transfers: list[tuple[int, int, float]] = []
     for one, other in tree.edges:
@@ -124,6 +135,7 @@ def _transfers(
         rest.remove_edge(one, other)
         flow_m2 = float(surplus_m2[list(nx.node_connected_component(rest, one))].sum())
         if abs(flow_m2) > least_m2:
+            # What is on one side of the edge has too much in all: that much has to cross it.
             transfers.append((one, other, flow_m2) if flow_m2 > 0 else (other, one, -flow_m2))
     takers = {taker for _, taker, _ in transfers}
     ready = [transfer for transfer in transfers if transfer[0] not in takers]
@@ -176,6 +188,7 @@ class _Giver:
         from_taker_m = dijkstra(ways, indices=np.flatnonzero(self.outlets), min_only=True)
         from_taker_m = np.where(self.owned, from_taker_m, -1.0)
         farthest = int(np.argmax(from_taker_m))
+        # Nothing given errs by the whole area: a part must come nearer than that.
         best, least_error = np.zeros(len(from_taker_m), dtype=bool), area_m2
         for _ in range(TRIES):
             below, above = self._bracket(farthest, area_m2)

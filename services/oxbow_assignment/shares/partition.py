@@ -72,6 +72,11 @@ class Partition:
             The vehicle of every triangle, 0 to k - 1, shape (m,); no share is empty.
         capacities
             What every vehicle can cover, in any unit, shape (k,).
+
+        Returns
+        -------
+        Partition
+            Of the shares as they are given.
         """
         seeds = _middles(mesh, share, len(capacities))
         return cls(mesh, share, _depth(mesh, share, seeds), tuple(seeds.tolist()), capacities)
@@ -122,6 +127,11 @@ def wavefront_partition(mesh: Mesh, starts: Sequence[Place], capacities: FloatAr
     capacities
         What each vehicle can cover, shape (k,); all equal by default. The partition's `due_m2` follows from it.
 
+    Returns
+    -------
+    Partition
+        Its shares are connected, of whatever area.
+
     Raises
     ------
     InvalidMission
@@ -154,6 +164,11 @@ def balanced_partition(
         Which triangles each vehicle may have, at least one each; all by default. A triangle that none of its
         neighbours' vehicles may have stays with its vehicle even so.
 
+    Returns
+    -------
+    Partition
+        On the given mesh, or one that is divided further.
+
     Raises
     ------
     InvalidMission
@@ -184,6 +199,11 @@ def rebalanced(partition: Partition, capacities: FloatArray, allowed: Mask) -> P
         What each vehicle can cover, > 0, in any unit, shape (k,).
     allowed
         Which triangles each vehicle may have, shape (k, m).
+
+    Returns
+    -------
+    Partition
+        On the same mesh.
     """
     share = _balanced(partition.mesh, partition.share, capacities, allowed)
     return Partition.of(partition.mesh, share, capacities)
@@ -218,6 +238,11 @@ def due_areas_m2(mesh: Mesh, share: Indices, capacities: FloatArray) -> FloatArr
         The vehicle of every triangle, 0 to k - 1, shape (m,); every share lies in one piece of the mesh.
     capacities
         What each vehicle can cover, in any unit, shape (k,).
+
+    Returns
+    -------
+    ndarray of float, shape (k,)
+        They add up to the area of the mesh.
     """
     piece = mesh.pieces[np.unique(share, return_index=True)[1]]
     areas_m2 = np.bincount(mesh.pieces, mesh.areas_m2)
@@ -230,6 +255,7 @@ def _rounds(mesh: Mesh, seeds: Indices, capacities: FloatArray, allowed: Mask) -
         share = _matched(mesh, propagate(mesh, seeds).source, allowed)
         share = _balanced(mesh, share, capacities, allowed)
         yield share
+        # As in Lloyd's relaxation: shares about their own middles are rounder, and have shorter borders.
         middles, before = _middles(mesh, share, len(capacities)), seeds
         seeds = np.where(allowed[np.arange(len(seeds)), middles], middles, seeds)
         if (seeds == before).all():
@@ -241,6 +267,7 @@ def _matched(mesh: Mesh, share: Indices, allowed: Mask) -> Indices:
     if allowed.all():
         return share
     barred_m2 = (~allowed * mesh.areas_m2) @ (share[:, None] == np.arange(len(allowed)))
+    # Waves know no ranges: a vehicle of short range may have got a share far away.
     vehicles, shares = linear_sum_assignment(barred_m2)
     return np.asarray(vehicles[np.argsort(shares)][share])
 

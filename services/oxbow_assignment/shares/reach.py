@@ -66,6 +66,11 @@ class Reach:
         water
             What legs to and from the free space may cross; None for the free space alone.
 
+        Returns
+        -------
+        Reach
+            For the triangles of this mesh.
+
         Raises
         ------
         Infeasible
@@ -141,6 +146,7 @@ class Reach:
         starts, ends = (bool(at[vehicle] >= 0 and own[at[vehicle]]) for at in (self.first, self.last))
         way_m = self.legs_m[vehicle]
         if not (starts and ends):
+            # The nearest triangle stands for the share: from there on, the vehicle surveys.
             way_m = (home_m if starts else out_m if ends else out_m + home_m).min()
         return float(self.lengths_m[vehicle] - way_m)
 

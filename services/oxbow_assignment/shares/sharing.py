@@ -96,6 +96,11 @@ def shared(
     water
         What legs to and from the free space may cross; by default the free space alone.
 
+    Returns
+    -------
+    Sharing
+        Its areas are of water that each master can reach.
+
     Raises
     ------
     InvalidMission
@@ -114,6 +119,7 @@ def shared(
     docks: list[Place] = [(x, y) for x, y in reach.docks.tolist()]
     # Ways to shares are not known before there are shares: the first ones take what the legs leave.
     partition = balanced_partition(mesh.part(within), docks, reach.lengths_m - reach.legs_m, reach.allowed)
+    # Balancing may have divided the mesh further: its triangles keep the ways of those that they are parts of.
     reach = reach.on(partition.mesh)
     partition = _by_length_left(partition, reach)
     own = _own(partition, reach)

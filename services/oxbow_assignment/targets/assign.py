@@ -125,6 +125,7 @@ def assign(problem: Problem, clustering: Clustering | None = None) -> Clustered:
     if not len(targets):
         idle = [problem.path(vehicle, ()) for vehicle in range(len(problem.vehicles))]
         return Clustered(assignment_of(problem, idle), targets, None, np.empty(0, dtype=np.intp), 0.0)
+    # By mean costs: clusters are of targets, and which vehicle gets them is decided only afterwards.
     coordinates = pseudo_coordinates(problem.mean_costs[np.ix_(targets, targets)])
     found = (
         _by_clusters(problem, targets, coordinates, clusters)
@@ -138,6 +139,7 @@ def _by_clusters(
 ) -> Clustered:
     owners = match(problem, clusters, targets)
     paths = cluster_paths(problem, targets, clusters, owners)
+    # Mended before starts are compared: a clustering is as good as what can be made of it.
     assignment = assignment_of(problem, mended(problem, paths, [0] * len(paths)))
     return Clustered(assignment, targets, clusters, owners, coordinates.stress)
 
@@ -183,6 +185,11 @@ def mended(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> l
         One per vehicle, each within its range: rows of the problem's distances, start first and recovery last.
     held
         How many leading targets of each path stay in front.
+
+    Returns
+    -------
+    list of ndarray of int
+        One path per vehicle, within its range; its held targets come first, as they were.
     """
     while True:
         paths = exchanged(problem, inserted(problem, paths, held), held)

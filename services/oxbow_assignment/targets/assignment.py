@@ -104,6 +104,11 @@ def tour_figures(problem: Problem, vehicle: int, path: Indices) -> FloatArray:
         Its index.
     path
         Rows of the problem's distances, start first and recovery last.
+
+    Returns
+    -------
+    ndarray of float, shape (2,)
+        At `COST` and `LENGTH`.
     """
     if len(path) <= 2:
         return np.zeros(2)
@@ -117,6 +122,11 @@ def tour_length(problem: Problem, vehicle: int, path: Indices) -> float:
     ----------
     problem, vehicle, path
         See `tour_figures`.
+
+    Returns
+    -------
+    float
+        In metres.
     """
     return float(tour_figures(problem, vehicle, path)[LENGTH])
 
@@ -130,6 +140,11 @@ def assignment_of(problem: Problem, paths: Sequence[Indices]) -> TargetAssignmen
         The targets, the vehicles, and the routes between them.
     paths
         One per vehicle: rows of the problem's distances, start first and recovery last.
+
+    Returns
+    -------
+    TargetAssignment
+        Ranges are not checked: whoever made the paths has kept to them.
     """
     figures = np.array([tour_figures(problem, vehicle, path) for vehicle, path in enumerate(paths)])
     tours = tuple(
@@ -187,6 +202,7 @@ def _reason(problem: Problem, target: int, detours: FloatArray, lengths: FloatAr
             f"out of every vehicle's reach: {problem.vehicles[nearest].name!r} would travel"
             f" {problem.there_and_back_m[nearest, target]:.0f} m and may travel {problem.lengths_m[nearest]:.0f} m"
         )
+    # Not the least detour, but the one that exceeds what is left of its vehicle's range by least.
     nearest = int((detours - (problem.lengths_m - lengths)).argmin())
     return (
         f"no range left: it would lengthen the tour of {problem.vehicles[nearest].name!r} by"

@@ -62,6 +62,11 @@ def faded(since_visit_s: FloatArray, fade_s: float) -> FloatArray:
     fade_s
         Seconds that fading takes, > 0.
 
+    Returns
+    -------
+    ndarray of float, of the shape of `since_visit_s`
+        1 also where a target was never visited (NaN).
+
     Raises
     ------
     InvalidMission
@@ -96,6 +101,11 @@ def k_means(
         Where to start; by default chosen by k-means++ (D. Arthur and S. Vassilvitskii, 2007).
     seed
         Seed of k-means++; unused if `centres` are given.
+
+    Returns
+    -------
+    Clusters
+        None of them empty.
 
     Raises
     ------
@@ -132,6 +142,11 @@ def fuzzy_c_means(
         Between 0 and 1, by default 1; see `faded`.
     seed
         Seed of the k-means that comes first.
+
+    Returns
+    -------
+    Clusters
+        None of them empty, by label.
 
     Raises
     ------
@@ -173,6 +188,11 @@ def cluster_by_radius(
     weights : ndarray of shape (n,)
         Between 0 and 1, by default 1; a target of weight 0 founds no cluster.
 
+    Returns
+    -------
+    Clusters
+        As few as the procedure needed; at most one per target.
+
     Raises
     ------
     InvalidMission
@@ -187,6 +207,7 @@ def cluster_by_radius(
         away = mean_distances(coordinates, clusters, weights)[np.arange(len(weights)), clusters.labels]
         away = np.where(weights > 0.0, away, 0.0)
         farthest = int(away.argmax())
+        # With as many clusters as targets no further one can help.
         if away[farthest] <= radius_m or clusters.count == len(weights):
             return clusters
         centres = np.vstack([clusters.centres, coordinates.places[farthest]])
@@ -209,8 +230,14 @@ def mean_distances(
         Clusters of these targets. One whose targets all have weight 0 counts them alike.
     weights : ndarray of shape (n,)
         Between 0 and 1, by default 1.
+
+    Returns
+    -------
+    ndarray of float, shape (n, k)
+        In metres along routes.
     """
     shares = clusters.memberships * _checked_weights(coordinates, weights)[:, None]
+    # A cluster whose targets all have weight 0 still has a middle: it is taken without weights.
     shares = np.where(shares.sum(axis=0) > 0.0, shares, clusters.memberships)
     distances: FloatArray = coordinates.distances_m @ (shares / shares.sum(axis=0))
     return distances
@@ -219,6 +246,7 @@ def mean_distances(
 def _squares(places: FloatArray, centres: FloatArray) -> FloatArray:
     """Squared Euclidean distances, shape (n, k)."""
     squares = (places**2).sum(axis=1)[:, None] + (centres**2).sum(axis=1)[None, :] - 2.0 * places @ centres.T
+    # The expanded square is quick, a single product of matrices, but may come out just below 0 for equal points.
     clipped: FloatArray = np.maximum(squares, 0.0)
     return clipped
 

@@ -35,8 +35,14 @@ def exchanged(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -
         One per vehicle, within its range: rows of the problem's distances, start first and recovery last.
     held
         How many leading targets of each path stay in front.
+
+    Returns
+    -------
+    list of ndarray of int
+        One path per vehicle.
     """
     paths = [in_order(problem, vehicle, path, held[vehicle]) for vehicle, path in enumerate(paths)]
+    # Once: which targets are near does not depend on the tours.
     near = _near(problem)
     while True:
         layout = Layout.of(problem, paths, held)
@@ -61,6 +67,11 @@ def in_order(problem: Problem, vehicle: int, path: Indices, held: int) -> Indice
         Rows of the problem's distances, start first and recovery last.
     held
         How many leading targets stay in front.
+
+    Returns
+    -------
+    ndarray of int
+        The same rows.
     """
     better = np.concatenate([path[:held], improved_path(problem.figures[COST, vehicle], path[held:])])
     return better if problem.is_within_range(vehicle, better) else path
@@ -111,6 +122,7 @@ def _relocations(layout: Layout, near: Indices, length: int) -> _Moves:
     fronts = np.broadcast_to(layout.fronts, (len(at), len(layout.fronts)))
     edges = np.concatenate([joins - 1, joins, fronts], axis=1)
     at, edges = np.repeat(at, edges.shape[1]), edges.ravel()
+    # Moves within a tour are for `in_order`.
     keep = (edges >= 0) & layout.is_open[edges] & (layout.tour[edges] != layout.tour[at])
     at, edges = at[keep], edges[keep]
     end = at + length - 1
@@ -189,6 +201,7 @@ def _tails(layout: Layout, near: Indices) -> _Moves:
         return dict(zip(tours, spliced, strict=True))
 
     has_role = layout.problem.has_role
+    # Tails are exchanged whole: it would take too long to check the role for each of their targets.
     alike = (has_role[:, None] == has_role[None, :]).all(axis=2)
     return _Moves(layout.gains(one, new_one, other, new_other, alike[one, other]), one, other, paths)
 

@@ -42,6 +42,11 @@ def trimmed(
         How many leading targets are removed last.
     wanted
         A target that is removed only after all others except the held ones; None for no such target.
+
+    Returns
+    -------
+    ndarray of int
+        The rows that are left, in order; start and recovery alone where no target fits.
     """
     inner = path[1:-1]
     path = np.concatenate([path[:1], inner[problem.can_visit[vehicle, inner]], path[-1:]])
@@ -50,7 +55,9 @@ def trimmed(
         before, at, after = path[:-2], path[1:-1], path[2:]
         saved = metres[before, at] + metres[at, after] - metres[before, after]
         worth = saved / problem.values[at]
+        # Removed only when nothing else is left: it is what the path was made longer for.
         worth[at == wanted] = np.finfo(float).min
+        # After `wanted`: a held target stays even then.
         worth[:held] = -np.inf
         path = np.delete(path, 1 + int(worth.argmax()))
     return path
@@ -67,6 +74,11 @@ def inserted(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) ->
         One per vehicle, within its range.
     held
         How many leading targets of each path stay in front.
+
+    Returns
+    -------
+    list of ndarray of int
+        One path per vehicle, within its range.
     """
     paths = list(paths)
     served = np.concatenate([path[1:-1] for path in paths])
@@ -161,6 +173,7 @@ def _offers(problem: Problem, vehicle: int, path: Indices, held: int, pool: Indi
     detours = np.where(fits, added[COST], np.inf)
     places = detours.argmin(axis=1)
     longer = now[COST] + np.minimum(detours.min(axis=1), FAR_M)
+    # The present cost at the end: its strain is what the others are compared with.
     strain = problem.strain(np.append(longer, now[COST]), np.full(len(pool) + 1, vehicle))
     costs = np.where(fits.any(axis=1), (strain[:-1] - strain[-1]) / problem.values[pool], np.inf)
     return _Offers(costs=costs, places=held + 1 + places)

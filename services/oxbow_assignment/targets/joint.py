@@ -75,6 +75,11 @@ def solve(
         See `assign`.
     patience, seed
         See `optimise`; the joint optimiser does not run if `patience` is None.
+
+    Returns
+    -------
+    JointSolution
+        Without a joint assignment where PyVRP is missing or was not asked for; its gap says which.
     """
     clustered = assign(problem, clustering)
     if patience is None or not is_available():
@@ -104,6 +109,11 @@ def optimise(problem: Problem, *, patience: int = PATIENCE, seed: int = 0) -> Ta
     seed
         Seed of the search.
 
+    Returns
+    -------
+    TargetAssignment
+        At least as good as any that a search met on the way.
+
     Raises
     ------
     Unavailable
@@ -120,6 +130,7 @@ def optimise(problem: Problem, *, patience: int = PATIENCE, seed: int = 0) -> Ta
     while best.cost_s - missed_s > PRECISION * best.cost_s:
         within_s = (best.cost_s + missed_s) / 2
         found = assignment_of(problem, solved(problem, patience=patience, seed=seed, within_s=within_s))
+        # A makespan counts as reached only if the same value is served: by leaving targets, any can be.
         if found.value == best.value and found.cost_s < best.cost_s:
             best = found
         else:
@@ -136,6 +147,11 @@ def gap_to(assignment: TargetAssignment, joint: TargetAssignment) -> Gap:
         What is compared.
     joint
         What the joint optimiser found.
+
+    Returns
+    -------
+    Gap
+        Without a figure where the two serve different values.
     """
     if assignment.value != joint.value:
         return Gap(None, f"clusters serve targets worth {assignment.value:g}, the joint optimiser {joint.value:g}")

@@ -66,6 +66,11 @@ class Layout:
             One per vehicle: rows of the problem's distances, start first and recovery last.
         held
             How many leading targets of each path stay in front.
+
+        Returns
+        -------
+        Layout
+            A snapshot: after a move, the tours are laid out anew.
         """
         sizes = np.array([len(path) for path in paths])
         rows, tour = np.concatenate(paths), np.repeat(np.arange(len(paths)), sizes)
@@ -76,6 +81,8 @@ class Layout:
         edges[:, :, :-1] = problem.figures[:, :, rows[:-1], rows[1:]]
         edges[:, :, lasts] = 0.0
         edges[:, :, firsts[sizes == 2]] = 0.0
+        # Running sums over all places: the length of any stretch is then one subtraction, for thousands of moves
+        # at once.
         along = np.zeros_like(edges)
         np.cumsum(edges[:, :, :-1], axis=2, out=along[:, :, 1:])
         edge = edges[:, tour, np.arange(len(rows))]
@@ -97,6 +104,11 @@ class Layout:
             The vehicles that would travel there, maybe not the path's own, shape (k,).
         first, last
             The places, each pair on one path, shape (k,).
+
+        Returns
+        -------
+        ndarray of float, shape (2, k)
+            In metres, to within the rounding of running sums.
         """
         return np.asarray(self.along[:, vehicles, last] - self.along[:, vehicles, first])
 
@@ -109,6 +121,11 @@ class Layout:
         ----------
         left, right
             The places, each pair on one path, shape (k,).
+
+        Returns
+        -------
+        ndarray of float, shape (2, k)
+            In metres.
         """
         owner = self.tour[left]
         is_empty = (left == self.firsts[owner]) & (right == self.lasts[owner])
@@ -127,8 +144,14 @@ class Layout:
             Cost and length of their new tours, in metres, shape (2, k).
         possible
             Which moves the roles allow, shape (k,).
+
+        Returns
+        -------
+        ndarray of float, shape (k,)
+            In seconds, or their power for a makespan; positive where a move is worth making.
         """
         strain, limits = self.problem.strain, self.problem.lengths_m * (1.0 - SUM_ROUNDING)
+        # A little below the range: summed along the path itself, the same length may come out greater.
         fits = (new_one[LENGTH] <= limits[one]) & (new_other[LENGTH] <= limits[other])
         before = strain(self.totals[COST, one], one) + strain(self.totals[COST, other], other)
         # Differences of running sums may come out just below 0.

@@ -46,6 +46,7 @@ def match(problem: Problem, clusters: Clusters, targets: Indices) -> Indices:
     barred = ~problem.can_visit[:, targets] @ shares * OUT_OF_REACH * costs.max()
     owners = np.full(clusters.count, -1)
     lengths: FloatArray = from_start
+    # Each round matches as many clusters as there are vehicles.
     while (left := np.flatnonzero(owners < 0)).size:
         durations = (lengths + barred) / problem.speeds_mps[:, None]
         vehicles, columns = linear_sum_assignment(durations[:, left])

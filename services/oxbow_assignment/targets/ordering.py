@@ -36,6 +36,11 @@ def path_length(distances: FloatArray, path: Indices) -> float:
         In metres, shape (m, m).
     path
         Rows of `distances`, shape (n,).
+
+    Returns
+    -------
+    float
+        In metres.
     """
     return float(distances[path[:-1], path[1:]].sum())
 
@@ -49,6 +54,11 @@ def best_path(distances: FloatArray, path: Indices) -> Indices:
         Symmetric and finite, in metres.
     path : ndarray of shape (n + 2,)
         Rows of `distances`; the first and the last stay, those between may come in any order.
+
+    Returns
+    -------
+    ndarray of int, shape (n + 2,)
+        The same rows, the first and the last in their places.
     """
     if len(path) <= EXACT_MOST + 2:
         return exact_path(distances, path)
@@ -144,6 +154,7 @@ def improved_path(distances: FloatArray, path: Indices) -> Indices:
     if len(path) < 4:
         return path
     local = distances[np.ix_(path, path)]
+    # Few near rows each: nearly every move that shortens a path makes a leg to one of them.
     near = neighbours(local)
     order = np.arange(len(path))
     least_m = LEAST_GAIN * path_length(distances, path)
@@ -161,6 +172,7 @@ def neighbours(distances: FloatArray) -> Indices:
     away = distances.copy()
     np.fill_diagonal(away, np.inf)
     k = min(NEIGHBOURS, len(away) - 1)
+    # Which they are matters, not their order: a partition is linear where sorting is not.
     nearest: Indices = np.argpartition(away, k - 1, axis=1)[:, :k]
     return nearest
 
@@ -216,5 +228,6 @@ def _best_or_opt(local: FloatArray, order: Indices, near: Indices) -> _Move:
     gain_m, start, length, edge, is_turned = max(moves)
     segment = np.arange(start, start + length)[:: -1 if is_turned else 1]
     rest = np.delete(np.arange(len(order)), slice(start, start + length))
+    # Places behind the segment have moved forward by its length once it is taken out.
     place = edge + 1 if edge < start else edge + 1 - length
     return _Move(gain_m, np.insert(rest, place, segment))

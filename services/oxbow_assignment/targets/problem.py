@@ -110,6 +110,11 @@ class Problem:
             Its index.
         targets
             Indices of targets, in order.
+
+        Returns
+        -------
+        ndarray of int, shape (k + 2,)
+            Rows of the problem's distances.
         """
         return np.array([self.starts[vehicle], *targets, self.recoveries[vehicle]])
 
@@ -173,6 +178,7 @@ class Problem:
         """
         costs = self.distances if self.costs is None else self.costs
         both = np.stack([np.broadcast_to(costs, self.lengths.shape), self.lengths])
+        # Finite, since infinity minus infinity in a gain would be NaN, and compare as false everywhere.
         far_m = 2.0 * max(float(both[np.isfinite(both)].max()), float(self.lengths_m.max()))
         return np.where(np.isfinite(both), both, far_m)
 
@@ -197,6 +203,11 @@ class Problem:
             Its index.
         path
             Rows of the distances, start first and recovery last.
+
+        Returns
+        -------
+        bool
+            Exactly, without an allowance for rounding.
         """
         length_m = float(self.figures[LENGTH, vehicle, path[:-1], path[1:]].sum())
         return len(path) <= 2 or length_m <= self.lengths_m[vehicle]

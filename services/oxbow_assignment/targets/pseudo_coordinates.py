@@ -65,6 +65,8 @@ def pseudo_coordinates(distances: FloatArray) -> PseudoCoordinates:
         )
     columns = distances / np.sqrt(len(distances))
     centred = columns - columns.mean(axis=0)
+    # `eigh` of the symmetric product rather than an SVD: rising, real, and enough for axes whose spread is not
+    # tiny.
     spreads, axes = np.linalg.eigh(centred.T @ centred)
     places = centred @ axes[:, spreads >= NOTHING * spreads.max()]
     return PseudoCoordinates(places=places, distances_m=distances, stress=_stress(places, distances))

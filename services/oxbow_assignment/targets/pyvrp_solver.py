@@ -50,6 +50,7 @@ def solved(problem: Problem, *, patience: int, seed: int, within_s: float | None
 def _data(problem: Problem, within_s: float | None) -> ProblemData:
     lengths, count = problem.lengths_m, len(problem.vehicles)
     longest_s = float((lengths / problem.speeds_mps).sum()) + _most_danger_s(problem)
+    # So large that no saving of time is worth a target of the least value.
     prizes = _steps(PRIZE * longest_s * problem.values / problem.values.min(initial=np.inf))
     far_m = 2.0 * max(float(lengths.max()), float(problem.figures.max()))
     metres, seconds = [], []

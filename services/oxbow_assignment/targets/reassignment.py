@@ -57,6 +57,11 @@ def reassign(problem: Problem, tours: Sequence[Sequence[int]], *, hysteresis_s: 
     hysteresis_s
         What each change of a current target must gain, in seconds of the objective; >= 0.
 
+    Returns
+    -------
+    Reassignment
+        With the assignment that keeps all current targets, for comparison.
+
     Raises
     ------
     InvalidMission
@@ -72,6 +77,7 @@ def reassign(problem: Problem, tours: Sequence[Sequence[int]], *, hysteresis_s: 
     bound = frozenset(vehicle for vehicle, target in enumerate(current) if target is not None)
     kept = best = _Candidate.of(problem, paths, bound, current)
     while best.bound:
+        # All at once too: two vehicles that should swap their targets gain nothing when only one is freed.
         freed = [frozenset(), *(best.bound - {vehicle} for vehicle in sorted(best.bound))]
         found = min(
             (_Candidate.of(problem, best.paths, bound, current) for bound in freed),

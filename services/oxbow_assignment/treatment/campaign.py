@@ -64,6 +64,11 @@ class Campaign:
             Those that count.
         swath_m
             The width that one pass treats.
+
+        Returns
+        -------
+        tuple of float
+            In the order of the hot spots, from 0 to 1.
         """
         return tuple(
             0.0 if water.is_empty else _swaths(journeys, water, swath_m).intersection(water).area / water.area
@@ -112,6 +117,11 @@ def plan_campaign(
         How these routes are found.
     seed
         Seed of the clustering.
+
+    Returns
+    -------
+    Campaign
+        With an empty schedule where nothing can be treated.
 
     Raises
     ------

@@ -113,6 +113,7 @@ def divided(treatments: Sequence[Treatment], fleet: Fleet) -> Division:
     parts: list[Part] = []
     out_of_reach: list[OutOfReach] = []
     while pieces:
+        # All pieces of a round together: a table of routes costs hardly more for many places than for one.
         ways = fleet.ways([piece.line for piece in pieces], [piece.spot for piece in pieces])
         spare = fleet.lengths_m[:, None] - ways.access_m
         longer: list[Part] = []

@@ -74,6 +74,11 @@ class FleetWays:
             Its index.
         start, goal
             Places, numbered as in `factors`: end 0 and 1 of line k are 2 k and 2 k + 1.
+
+        Returns
+        -------
+        LineString
+            In the free space; its ends are the two places.
         """
         table = self.tables[float(self.factors[slave, start, goal])]
         return LineString(table.polyline(int(self.rows[start]), int(self.rows[goal])))
@@ -87,6 +92,11 @@ class FleetWays:
             Its index.
         end
             2 k or 2 k + 1, for the first or last point of line k.
+
+        Returns
+        -------
+        LineString
+            Without the leg to the free space.
         """
         return self.route(slave, 2 * len(self.lengths_m) + slave, end)
 
@@ -97,6 +107,11 @@ class FleetWays:
         ----------
         slave, end
             See `out`.
+
+        Returns
+        -------
+        LineString
+            Without the leg from the free space.
         """
         return self.route(slave, end, 2 * len(self.lengths_m) + len(self.factors) + slave)
 
@@ -154,6 +169,11 @@ class Fleet:
         method
             How they are found.
 
+        Returns
+        -------
+        Fleet
+            With its legs; routes are searched for when they are asked for.
+
         Raises
         ------
         InvalidMission
@@ -204,6 +224,11 @@ class Fleet:
             What is treated; at least one.
         spots
             The name of each line's hot spot, for slaves with a danger factor for it; empty for no names.
+
+        Returns
+        -------
+        FleetWays
+            Infinite where no route leads.
         """
         ends = np.array([line.coords[end] for line in lines for end in (0, -1)])
         docks = np.array([leg.coords[-1] for leg in self.out] + [leg.coords[0] for leg in self.home])

@@ -43,8 +43,14 @@ def parallel_passes(region: BaseGeometry, free: Polygon, swath_m: float) -> list
         Where passes may run; land interrupts a pass.
     swath_m
         The width that one pass treats.
+
+    Returns
+    -------
+    list of LineString
+        Inside `free`; empty where land is in the middle of every band.
     """
     region = _essential(region)
+    # The narrowest width has the fewest bands, but not always the fewest metres: a few of the best are laid out.
     candidates = [_stripes(region, free, swath_m, heading) for heading in _headings(region)]
     return min(candidates, key=lambda passes: _length_m(passes, swath_m))
 
@@ -58,6 +64,11 @@ def passes_needed(region: BaseGeometry, swath_m: float) -> int:
         What is to be treated; of positive area.
     swath_m
         The width that one pass treats.
+
+    Returns
+    -------
+    int
+        At least 1.
     """
     return max(1, math.ceil(float(_widths_m(region.convex_hull)[1].min()) / swath_m))
 
@@ -121,6 +132,7 @@ def _stripes(region: BaseGeometry, free: Polygon, swath_m: float, heading: float
     count = max(1, math.ceil((y1 - y0) / swath_m - SWATH_SLACK))
     floors = y0 + (y1 - y0) / count * np.arange(count)
     ones = np.ones(count)
+    # A metre longer than the region: rounding must not cut its ends off.
     bands = shapely.box((x0 - 1.0) * ones, floors, (x1 + 1.0) * ones, floors + (y1 - y0) / count)
     # The bands are turned, not the region: rings of it that touch would make an invalid polygon after rounding.
     bands = shapely.transform(bands, lambda xy: xy @ turn.T)
@@ -145,6 +157,7 @@ def _bounds(geometry: BaseGeometry, turn: FloatArray) -> FloatArray:
 def _merged(band: Indices, low: FloatArray, high: FloatArray) -> Iterator[tuple[int, float, float]]:
     """Intervals of one band that overlap, joined: band, low and high end of each."""
     order = np.lexsort([low, band])
+    # No interval is open yet.
     at, start, end = -1, 0.0, 0.0
     for number, left, right in zip(band[order].tolist(), low[order].tolist(), high[order].tolist(), strict=True):
         if number == at and left <= end:

@@ -83,6 +83,11 @@ def scheduled(parts: Sequence[Part], fleet: Fleet, *, seed: int = 0) -> Schedule
     seed
         Seed of the clustering and of the joint optimiser.
 
+    Returns
+    -------
+    Schedule
+        Every part is in exactly one journey.
+
     Raises
     ------
     Internal
@@ -95,6 +100,7 @@ def scheduled(parts: Sequence[Part], fleet: Fleet, *, seed: int = 0) -> Schedule
     rounds: list[tuple[Journey, ...]] = []
     first: JointSolution | None = None
     while len(left):
+        # In the first round only: that is what goes out now, and what `first` is compared by.
         patience = PATIENCE if first is None and len(left) <= JOINT_MOST else None
         solution = solve(_problem(parts, fleet, ways, left), Clustering(seed=seed), patience=patience, seed=seed)
         first = first or solution
@@ -115,6 +121,7 @@ def _problem(parts: Sequence[Part], fleet: Fleet, ways: FleetWays, left: Indices
     half_m = ways.lengths_m[left] / 2
     figures = np.zeros((2, boats, rows, rows))
     between = ways.between[:, :, left[:, None], left].mean(axis=(4, 5))
+    # Half of each part on the way in and half on the way out: a tour's sum then has every part once.
     figures[:, :, :count, :count] = between + half_m[:, None] + half_m
     starts, recoveries = (of[:, :, left].mean(axis=3) + half_m for of in (ways.starts, ways.recoveries))
     # No vehicle passes another one's start or recovery: those entries only fill the matrix.

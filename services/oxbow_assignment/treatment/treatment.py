@@ -77,6 +77,11 @@ def treatment_of(spot: HotSpot, water: BaseGeometry, free: Polygon, router: Rout
     swath_m
         The width that one pass treats.
 
+    Returns
+    -------
+    Treatment
+        Its passes treat `COVERED` of the water, or as much as `ROUNDS` of further ones could.
+
     Raises
     ------
     InvalidMission
@@ -127,6 +132,11 @@ def ordered(passes: Sequence[LineString], free: Polygon) -> list[LineString]:
         In any order and direction.
     free
         The free space; prepared.
+
+    Returns
+    -------
+    list of LineString
+        The same lines, some of them reversed.
     """
     if len(passes) < 2:
         return list(passes)
@@ -147,6 +157,11 @@ def linked(passes: Sequence[LineString], free: Polygon, router: Router) -> LineS
         The free space; prepared.
     router
         Finds ways between passes with land between them.
+
+    Returns
+    -------
+    LineString
+        Inside `free` if the passes are.
     """
     parts = [passes[0]]
     for before, after in pairwise(passes):
@@ -163,6 +178,7 @@ def _distances(ends: FloatArray, free: Polygon) -> FloatArray:
     near = KDTree(ends).query(ends, k=min(NEAR + 1, len(ends)))[1]
     here = np.repeat(np.arange(len(ends)), near.shape[1])
     there = near.ravel()
+    # Near ends only: far ones are hardly ever next to each other in an order.
     sights = shapely.linestrings(np.stack([ends[here], ends[there]], axis=1))
     hidden = ~shapely.covers(free, sights) & (here != there)
     factor = np.ones_like(apart)

@@ -61,9 +61,15 @@ def with_detours(path: LineString, waters: Waters, most_m: float, *, reach_m: fl
         How long the path may become.
     reach_m
         Places nearer than this are near enough.
+
+    Returns
+    -------
+    LineString
+        No longer than `most_m`, unless the given path is; the path itself where no detour fits.
     """
     for _ in range(ROUNDS):
         before_m = path.length
+        # Of the path as the round begins: the search costs more than all detours, and serves the whole round.
         ways = _Ways(path, waters)
         for gap in _gaps(path, waters, most_m - before_m, reach_m):
             left_m = most_m - path.length
@@ -82,6 +88,7 @@ def _gaps(path: LineString, waters: Waters, left_m: float, reach_m: float) -> It
     apart_m = waters.spacing_m
     while True:
         chosen = _spread(points[far], distance_m[far], apart_m)
+        # A detour goes there and back.
         if len(chosen) < 2 or 2.0 * distance_m[far][chosen].sum() <= max(left_m, 0.0):
             break
         apart_m *= 1.5
@@ -94,6 +101,7 @@ def _spread(points: FloatArray, distance_m: FloatArray, apart_m: float) -> Indic
     index = cKDTree(points) if len(points) else None
     for number in np.argsort(-distance_m, kind="stable").tolist():
         if index is not None and not taken[number]:
+            # Places near a chosen one are served by its detour.
             taken[index.query_ball_point(points[number], apart_m)] = True
             chosen.append(number)
     return np.array(chosen, dtype=np.intp)
@@ -125,6 +133,11 @@ def detoured(path: LineString, waters: Waters, gap: FloatArray, left_m: float) -
         The place, shape (2,), in metres.
     left_m
         How much longer the path may become.
+
+    Returns
+    -------
+    LineString or None
+        Longer than the path by no more than `left_m`.
     """
     return _detoured(path, _Ways(path, waters), gap, left_m, short_of=0.0)
 
@@ -141,6 +154,7 @@ def _detoured(
             longer = _round(path, _end_of(out, length_m), waters, half_width_m)
             if longer is not None and longer.length - path.length <= left_m:
                 return longer
+        # A narrower strip touches less of the path: one that was crossed twice may be crossed once.
         half_width_m /= 2
     return None
 
@@ -157,6 +171,7 @@ def _way_out(path: LineString, ways: _Ways, gap: FloatArray) -> LineString:
     # The path may have been led along this very way since: what is beside it is no way to it.
     points = shapely.get_coordinates(way)
     met = np.flatnonzero(shapely.dwithin(shapely.points(points), path, HALF_WIDTH * waters.spacing_m))
+    # At 0 the place itself is that near, and the way there is all there is.
     if len(met) and met[0] > 0:
         way = LineString(points[: met[0] + 1])
     crossed = shapely.get_coordinates(way.intersection(path))
@@ -226,6 +241,7 @@ def _past(path: LineString, strip: Polygon, waters: Waters, gap_m: float) -> Lin
     way = np.vstack([head[-1:], _way_round(strip, head[-1], tail[0]), tail[:1]])
     if not shapely.covers(waters.passable.free_and_rounding, LineString(way)):
         return None
+    # The ends of `head` and `tail` are in the way already.
     longer = LineString(np.vstack([head[:-1], way, tail[1:]]))
     return LineString(shapely.remove_repeated_points(longer, ROUNDING_M).coords)
 
@@ -268,6 +284,7 @@ def _way_along(strip: Polygon, start: FloatArray, end: FloatArray, *, longer: bo
             shapely.get_coordinates(_part(ring, 0.0, first_m)) if first_m > 0.0 else between[:0],
         ]
     )
+    # The border is closed: its two ways between the places are the stretch between them and the rest.
     way = between if (last_m - first_m >= ring.length / 2) == longer else around
     is_forward = np.hypot(*(way[0] - start)) <= np.hypot(*(way[-1] - start))
     return way if is_forward else way[::-1]

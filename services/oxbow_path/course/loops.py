@@ -57,6 +57,8 @@ class Middles:
         is_gate = tail != head
         middle = ((mesh.tails + mesh.heads) / 2).reshape(-1, 3, 2)
         width_m = np.hypot(*(mesh.heads - mesh.tails).T).reshape(-1, 3)
+        # A gate is a side between two shores. A triangle with two is passed from one to the other, one with three
+        # is where three waters meet; one with all its corners on one shore has no middle.
         two, three = np.flatnonzero(is_gate.sum(axis=1) == 2), np.flatnonzero(is_gate.sum(axis=1) == 3)
         first = np.argmax(is_gate[two], axis=1)
         last = 2 - np.argmax(is_gate[two, ::-1], axis=1)
@@ -104,10 +106,12 @@ class Middles:
                 for so_far_m, ways in ((total_m, between), (narrow_m, narrow))
             )
             possible = ~inside & (totals_m <= most_m) & (narrows_m >= LEAST_SHARE * totals_m)
+            # The outer shore cannot be gone round inside the water.
             possible[self.exterior] = False
             best = int(np.argmax(np.where(possible, narrows_m, 0.0)))
             if not possible[best] or narrows_m[best] <= narrow_m:
                 return
+            # A copy, since the set before was yielded and is kept by the caller.
             inside = inside.copy()
             inside[best] = True
             total_m, narrow_m = float(totals_m[best]), float(narrows_m[best])

@@ -73,6 +73,7 @@ def best_plan(method: PathMethod, task: Task, display: Display) -> MethodPlan:
     Infeasible
         Even the shortest way from launch to recovery is longer than the vehicle can go.
     """
+    # Only the lines so far: to refine one takes as long as a method does, and may not be needed.
     courses = list(_courses(task))
     fitting = [course for course in courses if task.budget.fits(course.length)]
     by_method, by_course = partial(method, task, display), partial(_along, fitting, task, display)
@@ -82,8 +83,10 @@ def best_plan(method: PathMethod, task: Task, display: Display) -> MethodPlan:
         try:
             plans.append(way())
         except Infeasible as refusal:
+            # Where a course fits, it stands in for the method that refuses.
             if not fitting:
                 plans.append(_at_least(task, display, courses, refusal))
+        # Mostly the first plan is good, and the second, which would double the time, is not made.
         if plans and (task.stop() or _is_good(plans[-1].path, task)):
             break
     best = _reaching(min(plans, key=lambda plan: _score_m(plan.path, task)), task)
@@ -204,6 +207,7 @@ def _from_home(loop: LineString, task: Task) -> LineString | None:
     sight = shapely.shortest_line(home, loop)
     if not shapely.covers(waters.passable.free_and_rounding, sight):
         away = loop.project(home) + loop.length / 2
+        # Begun at its far side: a detour leaves the ends of a path where they are.
         turned = _turned(loop, away % loop.length)
         found = detoured(turned, waters, shapely.get_coordinates(home)[0], task.budget.most_m - loop.length)
         if found is None:
@@ -218,6 +222,7 @@ def _from_home(loop: LineString, task: Task) -> LineString | None:
             opening_m=CUT * waters.spacing_m,
             detail_m=waters.spacing_m,
         )
+    # A loop is one offer among others: where it does not work out, the method's own plan stands.
     except (Infeasible, Internal):
         return None
 

@@ -79,11 +79,17 @@ class Guard:
             A simple path inside it, except for its legs.
         spacing_m
             The nominal spacing, which scales clearance and look-ups.
+
+        Returns
+        -------
+        Guard
+            For this path and what it is moved to; for another path it would have to be made anew.
         """
         grown = free.buffer(ROUNDING_M)
         shapely.prepare(grown)
         usual_m = CLEARANCE * spacing_m
         every = np.arange(len(path.legs))
+        # Half the clearance to either side: two circles meet where the segments are within the whole.
         pairs = may_meet(path, every, np.full(len(every), usual_m / 2), spacing_m)
         near = beyond(path, pairs[:, ~path.legs[pairs].any(axis=0)], NEIGHBOURS)
         gap_m = least_gap_m(path, near)
@@ -116,8 +122,15 @@ class Guard:
             Segments (n - 1,) that may come near others and fold sharply, as legs may.
         known
             Pairs and clearances that hold however the nodes move within some reach; by default those of `path`.
+
+        Returns
+        -------
+        ndarray of bool, shape (n - 1,)
+            For every segment, suspect or not.
         """
         asked = np.arange(len(path.legs)) if suspect is None else np.flatnonzero(suspect)
+        # A caller that tries shares of one small move passes what holds for all of them; else it is found for
+        # this path.
         known = known or self._known(path, asked)
         excused = path.legs if excused is None else path.legs | excused
         fault = np.zeros(len(path.legs), dtype=bool)
@@ -184,13 +197,17 @@ class Guard:
             if turn >= LOCAL_ROUNDS:
                 blamed[1:] |= blamed[:-1]
                 blamed[:-1] |= blamed[1:]
+            # At fault although neither end moves: the fault was there before, and no share of the move can mend
+            # it.
             is_held = (fault & ~_of_any(share > 0.0)).any()
+            # Halved first, so that one fault costs its nodes a part of their step and not all of it.
             share[blamed] = share[blamed] / 2 if turn < HALVINGS else 0.0
             if is_held and excused is None:
                 # A second attempt would find the same, and take as long.
                 excused = self.faults(path, known=known)
                 blamed |= _ends(excused)
                 share[_ends(excused)] = 0.5**HALVINGS
+            # What did not change since it was checked is not checked again.
             suspect = _of_any(blamed)
         return None
 
@@ -203,6 +220,11 @@ class Guard:
             With n nodes.
         drop
             The nodes (n,) to leave out, none of them pinned or an end of a rigid segment.
+
+        Returns
+        -------
+        Polyline
+            As sound as the given path; that path itself where nothing can go.
         """
         before: Mask | None = None
         while drop.any():

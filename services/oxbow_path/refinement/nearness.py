@@ -49,6 +49,7 @@ def may_meet(path: Polyline, asked: Indices, reach_m: FloatArray, most_m: float)
     radius_m = path.lengths_m[owner] / (2 * pieces[owner]) + reach_m[owner]
     is_asked = np.zeros(len(pieces), dtype=bool)
     is_asked[asked] = True
+    # A search by circles, which over-reports: whatever is found is measured exactly by `nearer`.
     near = _within(middle, radius_m, is_asked[owner])
     pairs = np.sort(owner[near], axis=0)
     return _distinct(beyond(path, pairs, 1)) if len(owner) > len(pieces) else beyond(path, pairs, 1)
@@ -115,6 +116,11 @@ def least_gap_m(path: Polyline, pairs: Indices) -> float:
         Where the segments are.
     pairs
         Numbers of segments, shape (2, m).
+
+    Returns
+    -------
+    float
+        In metres, up to rounding; 0 where two cross.
     """
     return float(_gaps_m(path.nodes, pairs).min(initial=np.inf))
 
@@ -150,6 +156,11 @@ def beyond(path: Polyline, pairs: Indices, steps: int) -> Indices:
         Numbers of segments, shape (2, m).
     steps
         1 leaves out neighbours.
+
+    Returns
+    -------
+    ndarray of int, shape (2, k)
+        In the order of `pairs`.
     """
     return np.asarray(pairs[:, steps_between(path, pairs) > steps])
 
@@ -157,6 +168,7 @@ def beyond(path: Polyline, pairs: Indices, steps: int) -> Indices:
 def _gaps_m(nodes: FloatArray, pairs: Indices) -> FloatArray:
     """The distance between the two segments of each pair (2, m), up to rounding."""
     (a, b), (c, d) = ((nodes[one], nodes[one + 1]) for one in pairs)
+    # Two segments are nearest at an end of one of them, unless they cross.
     apart = np.min([_from_segment_m(*ends) for ends in ((a, c, d), (b, c, d), (c, a, b), (d, a, b))], axis=0)
     crosses = (_side(a, c, d) * _side(b, c, d) < 0.0) & (_side(c, a, b) * _side(d, a, b) < 0.0)
     return np.where(crosses, 0.0, apart)

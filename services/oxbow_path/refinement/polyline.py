@@ -48,6 +48,11 @@ class Polyline:
             The free space with room for rounding, prepared: segments that it does not cover are legs.
         rigid
             Which segments (n - 1,) stay one straight line; by default none.
+
+        Returns
+        -------
+        Polyline
+            With one node per vertex; its ends, and the nodes of segments that leave `free`, are pinned.
         """
         nodes = shapely.get_coordinates(path)
         segments = shapely.linestrings(np.stack([nodes[:-1], nodes[1:]], axis=1))
@@ -99,6 +104,7 @@ class Polyline:
         nodes = self.nodes[segment] + share * np.diff(self.nodes, axis=0)[segment]
         return Polyline(
             np.vstack([nodes, self.nodes[-1:]]),
+            # A new node is pinned only on a leg; else it is free even between two pinned ones.
             np.append(self.pinned[segment] & ((piece == 0) | self.legs[segment]), self.pinned[-1]),
             self.legs[segment],
             self.rigid[segment],

@@ -82,6 +82,7 @@ def feet(path: Polyline, points: FloatArray, spacing_m: float) -> Feet:
     squared_m2 = np.maximum(path.lengths_m**2, np.finfo(float).tiny)
     # By axis: sums over pairs take several times as long as sums of two arrays.
     (px, py), (x, y), (ex, ey) = (np.ascontiguousarray(each.T) for each in (points, path.nodes, edge))
+    # The nearest point along the path need not be on the nearest segment where two meet at a bend.
     for step in (0, -1, 1):
         candidate = np.clip(owner[nearest] + step, 0, len(edge) - 1)
         ox, oy, cx, cy = px - x[candidate], py - y[candidate], ex[candidate], ey[candidate]
@@ -135,6 +136,11 @@ class Pull:
             The share of the way to its sample that a foot is pulled.
         spacing_m
             The nominal spacing, which bounds the pull of short segments.
+
+        Returns
+        -------
+        Pull
+            Solved under any tension by `solved`.
         """
         count = len(path.nodes)
         on = at.on(path.nodes)
@@ -173,6 +179,7 @@ class Pull:
         diagonal[pinned], right[pinned] = 1.0, self.path.nodes[pinned]
         free = ~(pinned[:-1] | pinned[1:])
         banded = np.vstack([np.append(0.0, beside * free), diagonal])
+        # Linear in the number of nodes. The matrix is positive definite: every node is held to its place.
         return np.asarray(solveh_banded(banded, right, check_finite=False))
 
     def fitted(self, length_m: float, tension: float | None, spacing_m: float) -> PullSolution:
@@ -186,6 +193,11 @@ class Pull:
             That of the step before, near which this one's is looked for; None in the first step.
         spacing_m
             The nominal spacing, which scales the tensions that the first step tries.
+
+        Returns
+        -------
+        PullSolution
+            Longer than `length_m` only where even the greatest tension tried leaves it so.
         """
         if tension is None:
             unit = float(np.median(self.diagonal)) * spacing_m
@@ -195,6 +207,8 @@ class Pull:
         for _ in range(HALVINGS):
             # The geometric middle: the range spans orders of magnitude.
             middle = math.sqrt(low * high)
+            # Length falls as tension grows; `high` is always a tension under which it fits, or the greatest
+            # allowed.
             if np.hypot(*np.diff(self.solved(middle), axis=0).T).sum() > length_m:
                 low = middle
             else:

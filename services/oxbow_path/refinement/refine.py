@@ -135,10 +135,13 @@ def _states(
     last = int(np.clip(WORK // (len(samples) + NODE_WORK * len(path.nodes)), *STEPS))
     tension, aim_m = None, AIM * length_m
     for number in range(last + 1):
+        # Thinned before divided: what crowds is dropped, and the segment left may then be long enough to divide.
         path = guard.thinned(path, path.crowded(2 * SHORTEST * spacing_m)).divided(LONGEST * spacing_m)
+        # Nearest places anew at each step: the weights are those of least squares for the present distances.
         at = feet(path, samples.points, spacing_m)
         weighed_m = at.distance_m * samples.weights
         yield _state(path, weighed_m)
+        # Out of time, a path that is too long goes on: it is of no use to anyone.
         if number == last or (path.length_m <= length_m and stop()):
             return
         power = POWERS[0] + (POWERS[1] - POWERS[0]) * number / last
@@ -164,6 +167,7 @@ def _is_enough(state: RefinementStep, enough_m: float, length_m: float) -> bool:
 def _better(state: RefinementStep, best: RefinementStep, length_m: float) -> RefinementStep:
     """The new state, where it fits better, or fits too and lies nearer to all water."""
     if best.length_m > length_m:
+        # No path fits yet: the shorter the better, however much water it leaves.
         is_better = state.length_m < best.length_m
     else:
         is_better = state.length_m <= length_m and state.score_m < best.score_m

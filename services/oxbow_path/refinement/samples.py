@@ -48,7 +48,13 @@ class Samples:
             Distance of neighbouring places of the lattice.
         areas
             Where sampling is to be denser, or less dense.
+
+        Returns
+        -------
+        Samples
+            At least those on the shore.
         """
+        # A lattice leaves a strip along the shore without places, in which the farthest water often lies.
         shore = shapely.get_coordinates(shapely.segmentize(free.boundary, SHORE_PITCH * pitch_m))
         points = np.vstack([_lattice(free, pitch_m), shore])
         return cls(points, weights_at(points, areas))
@@ -90,6 +96,7 @@ def weights_at(points: FloatArray, areas: Sequence[WeightedArea]) -> FloatArray:
     """
     weights = np.ones(len(points))
     if areas:
+        # Areas do not overlap, so that no place has two weights.
         place, area = STRtree([entry.area for entry in areas]).query(shapely.points(points), predicate="within")
         weights[place] = np.array([entry.weight for entry in areas])[area]
     mean = weights.mean()

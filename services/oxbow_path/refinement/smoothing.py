@@ -38,12 +38,18 @@ def smoothed(path: Polyline, free: Polygon, spacing_m: float) -> LineString:
         The free space.
     spacing_m
         The nominal spacing, which scales the roundings and the detail that is left out.
+
+    Returns
+    -------
+    LineString
+        Simple and inside, as the path is; legs are left as they are.
     """
     # Rigid segments get control points as all others do, so that the corners at their ends are rounded too.
     loose = Polyline(path.nodes, path.pinned, path.legs, np.zeros_like(path.rigid))
     control = loose.divided(CONTROL_PITCH * spacing_m)
     fine = control.subdivided(PIECES)
     guard = Guard.of(free, fine, spacing_m)
+    # Moved from the corners to the curve under the guard: where the whole way is not sound, part of it is taken.
     rounded = guard.moved(fine, _spline(control.nodes, PIECES))
     return guard.thinned(rounded, _needless(rounded, DETAIL * spacing_m)).line
 

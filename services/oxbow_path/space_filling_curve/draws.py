@@ -33,6 +33,11 @@ def drawn_places(cells: Sequence[Cell], count: int, *, seed: int, draw: Draw) ->
     draw
         The sequence itself, or combinations of two of its points.
 
+    Returns
+    -------
+    ndarray, shape (count, 2)
+        Places (u, v) in the sweep frame, cell by cell.
+
     Raises
     ------
     ValueError
@@ -41,6 +46,7 @@ def drawn_places(cells: Sequence[Cell], count: int, *, seed: int, draw: Draw) ->
     if count <= 0:
         raise ValueError(f"count is {count}; expected a number > 0")
     areas = np.array([_Profile(cell).area_m2 for cell in cells])
+    # The ends of the cells' shares are rounded, not the shares: these then add up to `count`.
     ends = np.rint(np.cumsum(areas) / areas.sum() * count).astype(int)
     shares = np.diff(ends, prepend=0)
     generator = np.random.default_rng(seed)

@@ -101,6 +101,8 @@ def organised(
         if stop():
             return
         if number > 0:
+            # The ring's length grows about with its nodes; bounded, since in narrow water more nodes add no
+            # length.
             count = float(np.clip(count * LENGTH_AIMED * length_m / ring.length_m, least, most))
         mean_m = ring.length_m / count
         ring = guard.thinned(ring, ring.crowded(2 * SHORTEST * mean_m)).divided(LONGEST * mean_m)
@@ -114,6 +116,8 @@ def _means(ring: Polyline, draws: FloatArray, weights: FloatArray, width: float)
     count = len(ring.nodes)
     _, winner = cKDTree(ring.nodes, balanced_tree=False, compact_nodes=False).query(draws, workers=-1)
     sums = np.column_stack([np.bincount(winner, weights * column, count) for column in (1.0, *draws.T)])
+    # Sums and counts are spread alike, and then divided: the weighted mean over the whole neighbourhood, at the
+    # cost of a filter rather than of a matrix.
     spread = gaussian_filter1d(sums, width, axis=0, mode="wrap" if ring.is_closed else "constant")
     drawn = spread[:, 0] > LEAST_DRAWS * weights.mean()
     means = ring.nodes.copy()

@@ -51,6 +51,11 @@ def space_filling_curve(task: Task, display: Display) -> MethodPlan:
     display
         Shows how the path came about.
 
+    Returns
+    -------
+    MethodPlan
+        Its spacing is the nominal one: a ring has no legs at a pitch.
+
     Raises
     ------
     Infeasible
@@ -93,6 +98,7 @@ def _epochs(ring: Polyline, task: Task) -> Iterator[Epoch]:
     return organised(
         ring,
         draws,
+        # Squared: a place of weight w is to be w times as near, which takes w^2 times as many draws.
         weights_at(draws, task.areas) ** 2,
         Guard.of(task.waters.free, ring, task.spacing_m),
         length_m=task.useful_length_m,

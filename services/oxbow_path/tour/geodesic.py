@@ -67,6 +67,8 @@ class ShoreSights:
         self._corners, sectors = self._mesh.sector_places, self._mesh.sectors
         places, place, count = np.unique(self._corners, axis=0, return_inverse=True, return_counts=True)
         self._touches = MultiPoint(places[count > 1])
+        # A corner where rings touch belongs to several sectors, and sight does not say to which: it is joined by
+        # triangles only.
         self._plain = np.flatnonzero(count[place] == 1)
         plain = self._corners[self._plain]
         near = self._plain[_nearest(plain, plain, CORNERS_IN_SIGHT)]
@@ -110,6 +112,7 @@ class Geodesics:
         rows = []
         for first in range(0, self.count, CHUNK):
             sources = np.arange(first, min(first + CHUNK, self.count))
+            # The limit makes each search local; without it, all pairs of thousands of sites would be searched for.
             distance = dijkstra(self.graph, indices=sources, limit=limit_m)[:, : self.count]
             row, column = np.nonzero(np.isfinite(distance) & (distance > 0.0))
             rows.append(coo_array((distance[row, column], (row, column)), shape=distance.shape))
@@ -145,12 +148,18 @@ class Geodesics:
         ----------
         starts, goals
             The numbers of the sites, shape (n,).
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            In metres, in the order of the pairs.
         """
         return np.array([leg.length_m for leg in self._legs(starts, goals)])
 
     def way(self, order: Sequence[int] | Indices) -> FloatArray:
         """The closed way through the sites in that order, shape (m, 2), its end equal to its start."""
         starts, goals = np.asarray(order), np.roll(order, -1)
+        # Two in sight of each other need no search: the straight line is the shortest.
         seen = (np.asarray(self.graph[starts, goals]).ravel() > 0.0) | (starts == goals)
         winding = iter(self._legs(starts[~seen], goals[~seen]))
         parts = [

@@ -72,6 +72,8 @@ def shortened(start: Start, *, seed: int) -> TourSolution:
     count = len(start.order)
     if count >= LEAST_SITES:
         rng = np.random.default_rng(seed)
+        # All random numbers at once, so that the same seed gives the same kicks whatever the search does with
+        # them.
         kicks = rng.random((min(KICKS * count, MOST_KICKS), 1 + 2 * WALK))
         for first in range(0, len(kicks), ROUND):
             gained_m = sum(search.kick(chances) for chances in kicks[first : first + ROUND].tolist())
@@ -126,6 +128,7 @@ class _Search:
         ends = [self._site[(at + step) % self._count] for at in (i, j, k) for step in (0, 1)]
         a, a1, b, b1, c, c1 = ends
         to = self._to
+        # Only legs between near sites have a known length.
         if j in (i, k) or not (b1 in to[a] and c1 in to[b] and a1 in to[c]):
             return 0.0
         before = self.order.copy()
@@ -134,6 +137,7 @@ class _Search:
         gained_m += self.descend(ends)
         if gained_m >= 0.0:
             return gained_m
+        # In place: views of the array are held for speed.
         self.order[:] = before
         self._place[before] = np.arange(self._count)
         return 0.0
@@ -156,6 +160,8 @@ class _Search:
             b = onward(a)
             leg_m = self._to[a][b]
             for c in self._near[a]:
+                # The near sites come in order of distance: once the new leg alone is no shorter than the old,
+                # none further can be.
                 gain_m = leg_m - self._to[a][c]
                 if gain_m <= self._least_gain_m:
                     break
@@ -207,6 +213,7 @@ class _Search:
     def _reverse(self, start: int, end: int) -> None:
         """Turn the stretch between two places round, or else the rest: that is the same tour."""
         count = (end - start) % self._count + 1
+        # At most half the tour is rewritten per move.
         if 2 * count > self._count:
             start, count = end + 1, self._count - count
         where = self._circle[start % self._count :][:count]

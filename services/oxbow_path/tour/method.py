@@ -22,6 +22,11 @@ def tour(task: Task, display: Display) -> MethodPlan:
     display
         Shows every trial, the chosen tour, and the refinement.
 
+    Returns
+    -------
+    MethodPlan
+        Its spacing is the pitch of the sites.
+
     Raises
     ------
     Infeasible

@@ -41,11 +41,18 @@ def enclosed(way: FloatArray, free: Polygon, lane_m: float) -> Polygon:
         The water.
     lane_m
         Half the width of a lane, and of the joints between parts that only touch.
+
+    Returns
+    -------
+    Polygon
+        Inside `free`, except for islands that it encloses.
     """
+    # A tour of one site, or of sites in one place: a small disc is its region.
     if (way == way[0]).all():
         return largest(Point(way[0]).buffer(lane_m).intersection(free))
     stretches = shapely.get_parts(shapely.union_all([LineString(way)], grid_size=GRID_M))
     faces = shapely.get_parts(shapely.polygonize(stretches))
+    # An empty polygon first: a way that encloses nothing has no faces to unite.
     region = shapely.union_all([Polygon(), *faces[_is_odd(faces, way)]])
     boundary = region.boundary
     shapely.prepare([region, boundary])
@@ -76,6 +83,7 @@ def _is_odd(faces: Geometries, way: FloatArray) -> Mask:
     edges = STRtree(np.asarray(shapely.linestrings(np.stack([way[:-1], way[1:]], axis=1))))
     face, edge = edges.query(shapely.linestrings(ray))
     (x, y), (x0, y0), (x1, y1) = inner[face].T, way[edge].T, way[edge + 1].T
+    # Half open, so that a ray through a vertex counts its two edges once or twice, as it should.
     spans = (y0 > y) != (y1 > y)
     # Level edges span no ray; the 1 only avoids a division by zero.
     rise = np.where(y1 == y0, 1.0, y1 - y0)

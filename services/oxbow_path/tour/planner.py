@@ -126,6 +126,11 @@ def plan_tour(task: Task, *, solver: Solver | None = None) -> TourPlan:
     solver
         What shortens tours; the best that is installed where absent.
 
+    Returns
+    -------
+    TourPlan
+        Its chosen trial fits the budget.
+
     Raises
     ------
     Infeasible
@@ -133,6 +138,7 @@ def plan_tour(task: Task, *, solver: Solver | None = None) -> TourPlan:
     """
     budget = task.budget
     area_m2 = task.waters.free.area
+    # More sites than one per square of the least spacing would put legs nearer than that.
     most = max(1, int(area_m2 / budget.least_spacing_m**2))
     first = min(most, max(1, round((budget.most_m / EVENNESS) ** 2 / area_m2)))
     attempt = _Attempt(
@@ -148,6 +154,7 @@ def plan_tour(task: Task, *, solver: Solver | None = None) -> TourPlan:
         raise budget.too_short(shortest_m)
     chosen = min(fitting, key=lambda trial: _score(trial, task.waters, budget))
     if not _is_enough(chosen, budget, most):
+        # Length left over goes to spurs, unless these make the path simple by rounding alone.
         longer = replace(chosen, trial=with_remainder(chosen.trial, task.waters, budget))
         chosen = longer if longer.fits(budget) else chosen
     return TourPlan(chosen, tuple(trials))
@@ -267,6 +274,7 @@ def _shortened(attempt: _Attempt, trials: Sequence[TourTrial], budget: Budget) -
         fits = fits or trial.fits(budget)
         if trial.fits(budget) and trial.length_m >= budget.enough_m:
             break
+        # The tour's length is aimed at by what the path's was off: lanes and legs cost about the same each time.
         tour_m = max(0.0, tour_m + target_m - trial.length_m)
     if not fits:
         yield attempt.path(attempt.tour(0))

@@ -49,6 +49,8 @@ class Sight:
         a, b = self._sides[side, 0], self._sides[side, 1]
         meets, crosses = _meetings(begins[line], ends[line], a, b)
         is_inside = np.logical_or(*shapely.contains_xy(self._free, places)[pairs].T)
+        # From shore to shore neither end lies inside, and the middle decides between a chord of the water and one
+        # of land.
         from_shore = np.flatnonzero(~is_inside)
         is_inside[from_shore] = shapely.contains_xy(self._free, (begins[from_shore] + ends[from_shore]) / 2)
         crossing, unsure = np.zeros((2, len(pairs)), dtype=bool)

@@ -66,10 +66,12 @@ def clustered(samples: FloatArray, count: int, free: Polygon) -> FloatArray:
         _, owner = cKDTree(centres).query(samples)
         size = np.bincount(owner, minlength=count)
         sums = np.column_stack([np.bincount(owner, weights=axis, minlength=count) for axis in samples.T])
+        # A centre without samples stays where it is, rather than going to 0 / 0.
         centres = np.where(size[:, None] > 0, sums / np.maximum(size, 1)[:, None], centres)
     on_land = ~shapely.contains_xy(free, centres)
     _, nearest = cKDTree(samples).query(centres[on_land])
     centres[on_land] = samples[nearest]
+    # Sorted: the tour must not depend on the order in which clusters were found.
     return np.unique(centres, axis=0)
 
 

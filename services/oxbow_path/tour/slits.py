@@ -41,6 +41,11 @@ def slit(region: Polygon, slits: Geometries) -> Polygon:
         The region, perhaps with holes, in metres.
     slits : array of Polygon, shape (n,)
         Areas that may reach beyond it, and overlap one another.
+
+    Returns
+    -------
+    Polygon
+        In one piece; the region itself without slits.
     """
     if len(slits) == 0:
         return region
@@ -71,6 +76,11 @@ def slit_in_turn(region: Polygon, slits: Geometries) -> Polygon:
         The region, in one piece, perhaps with holes, in metres.
     slits : array of Polygon, shape (n,)
         Areas that may reach beyond it, and overlap one another; at least one.
+
+    Returns
+    -------
+    Polygon
+        In one piece, to within the grid.
     """
     outside, cut = _Outside(region, slits), np.zeros(len(slits), dtype=bool)
     untried = [np.arange(len(slits))]
@@ -80,6 +90,7 @@ def slit_in_turn(region: Polygon, slits: Geometries) -> Polygon:
             cut[numbers] = True
         elif len(numbers) > 1:
             half = len(numbers) // 2
+            # The first half is on top of the stack: earlier slits take precedence.
             untried += [numbers[half:], numbers[:half]]
     # On the grid it is in one piece: what else a difference leaves is thinner than that, or nothing but lines.
     return largest(region.difference(shapely.union_all(slits[cut])))
@@ -128,6 +139,7 @@ class _Outside:
         joined = _parts(len(parts), part[np.searchsorted(corners, self._edges[edges])])
         more_parts = joined.max() + 1 - len(np.unique(self._part[old_corners]))
         more_edges = np.count_nonzero(~self._has_edge[edges])
+        # Euler's formula for what is added: a difference means that it runs round something.
         if more_parts != len(corners) - len(old_corners) - more_edges + len(faces):
             return False
         self._has_face[faces] = self._has_edge[edges] = self._has_corner[corners] = True

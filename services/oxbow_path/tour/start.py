@@ -38,6 +38,11 @@ def first_tour(geodesics: Geodesics, limit_m: float) -> Start:
         Between at least three sites.
     limit_m
         The greatest distance of near sites.
+
+    Returns
+    -------
+    Start
+        A tour of all sites, with the distances of near pairs and of its own legs.
     """
     order = _round_tree(geodesics.spanning_tree())
     near = geodesics.near(limit_m)

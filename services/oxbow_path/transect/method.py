@@ -36,6 +36,11 @@ def transects(task: Task, display: Display) -> MethodPlan:
     display
         Shows how the path came about.
 
+    Returns
+    -------
+    MethodPlan
+        Its spacing is that of the chosen pattern.
+
     Raises
     ------
     Infeasible
@@ -52,5 +57,6 @@ def transects(task: Task, display: Display) -> MethodPlan:
 def _polyline(trial: Trial, task: Task) -> Polyline:
     """The path, its transects rigid: they stand upright in the sweep frame."""
     across, along = np.abs(np.diff(shapely.get_coordinates(trial.path), axis=0)).T
+    # Links run upright too, but are hardly longer than a spacing: they are left to bend.
     rigid = (across < UPRIGHT * along) & (along > trial.pattern.spacing_m)
     return Polyline.of(trial.path, task.waters.passable.free_and_rounding, rigid)

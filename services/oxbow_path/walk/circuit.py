@@ -87,6 +87,7 @@ def _spanning_tree(cells: Sequence[Cell], transects: Sequence[Transect]) -> nx.G
         a, b = ("slot", left, len(slots[left]) - 1), ("slot", right, 0)
         weight = (slots[left][-1][2] + slots[right][0][2]) / 2
         graph.add_edge(a, b, weight=weight, port=Port(float(cells[right].floor[0, 0]), low, high))
+    # A tree and not a cycle cover: what is walked round has no cycles, which would enclose holes.
     tree = nx.minimum_spanning_tree(graph)
     leaves = [node for node in tree if node[0] == "slot" and tree.degree(node) <= 1]
     while leaves:
@@ -157,6 +158,7 @@ def _link(cell: Cell, near: Port, far: Port, inset_m: float) -> LineString:
     if near.u == far.u:
         return _detour(cell, near, far, inset_m)
     _, floor, ceiling = _profile(cell, near.u, far.u)
+    # A level line is one straight leg, where the cell has a common height all the way.
     low = max(float(floor.max()), near.low, far.low)
     high = min(float(ceiling.min()), near.high, far.high)
     if high > low:

@@ -50,6 +50,7 @@ def reach_gaps(
     """
     for _ in range(ROUNDS):
         distance = probe.distances(walk.ring)
+        # Worst first: a branch into a deep gap passes and serves shallower ones on its way.
         worst_first = np.argsort(-distance)
         gaps = probe.points[worst_first[: np.count_nonzero(distance > reach_m)]]
         if len(gaps) == 0:

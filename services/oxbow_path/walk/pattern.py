@@ -23,6 +23,11 @@ def try_transects(waters: Waters, pattern: Pattern) -> Trial:
         The water, its cells, and how launch and recovery points are reached.
     pattern
         The spacing, and the phase of the transects.
+
+    Returns
+    -------
+    Trial
+        Longer than the budget, perhaps: that is for the caller to judge.
     """
     transects = place_transects(
         waters.cells,

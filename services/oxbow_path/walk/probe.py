@@ -39,6 +39,11 @@ class Probe:
             The free space.
         pitch_m
             Distance of neighbouring points of the grid, and the largest along the shore.
+
+        Returns
+        -------
+        Probe
+            With the points of the grid first, then those on the shore.
         """
         x0, y0, *_ = free.bounds
         inside = lattice_within(free, (x0 + pitch_m / 2, y0 + pitch_m / 2), pitch_m, pitch_m)
@@ -78,6 +83,11 @@ def covered(points: FloatArray, steps: FloatArray, reach_m: float) -> bool:
         What covers it, shape (m, 2): points along a path.
     reach_m
         The largest distance from a point to its nearest step, itself within reach.
+
+    Returns
+    -------
+    bool
+        True without points, False with points and no steps.
     """
     if len(points) == 0:
         return True

@@ -105,6 +105,8 @@ class Brush:
         BaseGeometry
             The union of all bands, inside the free space; empty without lines.
         """
+        # Two widths of each line; the narrow one is kept wherever the wide one would touch the margin along the
+        # shore.
         wide, core = (
             shapely.union_all(_dilations(lines, width_m, flat=flat))
             for width_m in (self.half_width_m, CORE * self.half_width_m)
@@ -157,6 +159,11 @@ def clear_of_land(region: BaseGeometry, free: Polygon) -> Polygon:
         May reach beyond the free space.
     free
         The free space.
+
+    Returns
+    -------
+    Polygon
+        Without holes; empty where the region meets no water.
     """
     return Polygon(largest(region.intersection(free)).exterior)
 
@@ -257,6 +264,7 @@ def _open(region: Polygon, cuts: Sequence[LineString], width_m: float) -> Polygo
     for _ in range(NARROWINGS):
         slits = shapely.union_all(shapely.buffer(np.asarray(cuts), width_m / 2))
         opened = largest(region.difference(slits))
+        # A cut that removes more area than it has parts something off, which is then lost with `largest`.
         if not opened.interiors and region.area - opened.area <= slits.area + AREA_TOLERANCE * region.area:
             return opened
         width_m /= 2

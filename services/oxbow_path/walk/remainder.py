@@ -74,9 +74,12 @@ def _with_spur(trial: Trial, waters: Waters, left_m: float) -> Trial | None:
         longer = _grown(trial, waters, spur)
         if longer is None:
             return None
+        # A spur is walked on both sides, but where it meets other bands it may also shorten the path.
         growth_m = longer.length_m - trial.length_m
         if (
             0.0 < growth_m <= left_m
+            # A spur may merge with bands beside it, whose rings then serve nothing: no gap may become deeper for
+            # it.
             and waters.probe.distances(longer.path).max() <= depth_m
             and _keeps_clear(longer.path)
         ):

@@ -92,6 +92,11 @@ def fitted(
     widest_m
         A spacing that leaves nothing but the way from launch to recovery: the last to be tried, if nothing fits.
 
+    Returns
+    -------
+    Fit
+        Its chosen trial fits the budget.
+
     Raises
     ------
     Infeasible
@@ -104,6 +109,7 @@ def fitted(
         if budget.is_enough(trials[-1]):
             break
         spacing_m = max(_next_spacing(trials, budget), budget.least_spacing_m)
+    # The last resort: no transects at all, only the way from launch to recovery and branches.
     if math.isfinite(widest_m) and not any(budget.fits(trial.length_m) for trial in trials):
         trials.append(attempt(Pattern(widest_m)))
     return Fit(_longest(trials, budget), tuple(trials))
@@ -128,6 +134,7 @@ def _next_spacing(trials: Sequence[Trial], budget: Budget) -> float:
         return math.exp(interpolated(too_small, too_large, target))
     sensitivity = SENSITIVITY
     if len(points) > 1 and points[-1][1] != points[-2][1]:
+        # Bounded below, since length jumps where a transect more fits: two trials may show a slope of 0.
         seen = (points[-2][0] - points[-1][0]) / (points[-1][1] - points[-2][1])
         sensitivity = min(max(seen, SENSITIVITY / 2), SENSITIVITY * 2)
     return math.exp(points[-1][1] + (points[-1][0] - target) / sensitivity)

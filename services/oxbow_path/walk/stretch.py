@@ -22,6 +22,11 @@ def stretch(line: LineString, start_m: float, end_m: float) -> FloatArray:
         Of any length.
     start_m, end_m
         Distances along it, in rising order.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        In metres; the two ends are interpolated, all else are vertices of the line.
     """
     points = shapely.get_coordinates(line)
     at_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])

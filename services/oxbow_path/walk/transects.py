@@ -39,6 +39,11 @@ def sweep_lines(cells: Sequence[Cell], pitch_m: float, phase: float) -> FloatArr
         Distance between neighbouring sweep lines.
     phase
         Where the first line stands past the least u of the cells, as a fraction of the pitch.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        In metres, `pitch_m` apart; empty where the water is narrower than the phase.
     """
     start = min(cell.floor[0, 0] for cell in cells)
     end = max(cell.floor[-1, 0] for cell in cells)
@@ -70,6 +75,7 @@ def place_transects(
     lines = sweep_lines(cells, pitch_m, phase)
     transects = []
     for index, cell in enumerate(cells):
+        # A line exactly between two cells belongs to the left one, and not to both.
         first, last = np.searchsorted(lines, [cell.floor[0, 0], cell.floor[-1, 0]], side="right")
         us = lines[first:last]
         lows = np.interp(us, cell.floor[:, 0], cell.floor[:, 1])

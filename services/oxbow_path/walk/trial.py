@@ -124,13 +124,21 @@ def walked(waters: Waters, pattern: Pattern, circuit: Circuit) -> Trial:
         The spacing of the legs, and how far water may be from them.
     circuit
         The tree; without transects, the walk starts from the launch point's entry alone.
+
+    Returns
+    -------
+    Trial
+        Simple, and inside the free space except for its legs, whatever its length.
     """
     brush = Brush(waters.free, pattern.half_width_m, pattern.trim_m)
     connected = partial(
         simply_connected, free=waters.free, probe=waters.probe, cut_width_m=pattern.cut_m, reach_m=pattern.reach_m
     )
+    # The tree's region, grown to both entries, rid of holes, grown into gaps: in this order, since each step
+    # relies on what the one before has made sure of.
     walk = connected(grown_to_entries(_started(waters, circuit, brush), waters, brush))
     walk = reach_gaps(walk, brush, waters.probe, waters.routes, reach_m=pattern.reach_m, cut_width_m=pattern.cut_m)
+    # Straightening may open holes and part an entry from the region: both are mended once more.
     region = _straightened(walk.region, waters, STRAIGHTENING * pattern.spacing_m)
     region = connected(grown_to_entries(region, waters, brush)).region
     # A cut may have parted an entry from the region. What the region encloses once grown back to it is filled.
@@ -152,6 +160,11 @@ def finished(waters: Waters, pattern: Pattern, circuit: Circuit, walk: Walk) -> 
         The lines that the walk goes round: kept for display.
     walk
         A simply connected region whose boundary becomes the path.
+
+    Returns
+    -------
+    Trial
+        With the path from launch to recovery.
     """
     width_m = STRAIGHTENING * pattern.spacing_m
     for _ in range(SMOOTHINGS):
@@ -227,5 +240,10 @@ def touches_entries(region: Polygon, waters: Waters) -> bool:
         The walk's region.
     waters
         The entries of launch and recovery points.
+
+    Returns
+    -------
+    bool
+        True for both entries, to within rounding.
     """
     return all(shapely.dwithin(region, entry, ROUNDING_M) for entry in waters.entries)

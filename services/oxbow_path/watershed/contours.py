@@ -66,6 +66,8 @@ def contour_tree(free: Polygon, routes: Routes, *, first_m: float, spacing_m: fl
 
 def _parts(area: Polygon, inwards_m: float, spacing_m: float) -> tuple[_Part, ...]:
     """The pieces that are left of an area eroded, largest first, each with those of the levels inside."""
+    # Level from level, not from the shore: each buffer then works on few vertices. Simplified, since every erosion
+    # adds arcs at each corner of an island.
     eroded = area.buffer(-inwards_m).simplify(DETAIL * spacing_m)
     pieces = shapely.get_parts(eroded)
     pieces = pieces[shapely.area(pieces) > LEAST_AREA * (spacing_m / 2) ** 2]
@@ -94,6 +96,7 @@ def _links(roots: Sequence[_Part]) -> Iterator[LineString]:
     graph: nx.Graph[LinearRing] = nx.Graph()
     for part in _all_parts(roots):
         family = [*part.rings, *(ring for inner in part.inner for ring in inner.rings)]
+        # Reshaped for a family of one, which has no pairs.
         pairs = np.array(list(itertools.combinations(family, 2)), dtype=object).reshape(-1, 2)
         for (one, other), distance in zip(pairs, shapely.distance(*pairs.T), strict=True):
             graph.add_edge(one, other, weight=distance)

@@ -36,6 +36,11 @@ def watershed(task: Task, display: Display) -> MethodPlan:
     display
         Shows how the path came about.
 
+    Returns
+    -------
+    MethodPlan
+        Its spacing is that of the chosen pattern.
+
     Raises
     ------
     Infeasible
@@ -60,6 +65,11 @@ def plan_watershed(waters: Waters, budget: Budget) -> Fit:
     budget
         The longest path, and the least spacing.
 
+    Returns
+    -------
+    Fit
+        The chosen trial has its spurs.
+
     Raises
     ------
     Infeasible
@@ -81,6 +91,11 @@ def try_contours(waters: Waters, pattern: Pattern) -> Trial:
         The water, and how launch and recovery points are reached.
     pattern
         The spacing; its phase does not matter.
+
+    Returns
+    -------
+    Trial
+        Longer than the budget, perhaps: that is for the caller to judge.
     """
     circuit = contour_tree(
         waters.free,

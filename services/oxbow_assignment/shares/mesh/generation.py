@@ -54,6 +54,11 @@ def mesh_area(
     relaxations
         Rounds of Lloyd's relaxation.
 
+    Returns
+    -------
+    Mesh
+        Its triangles cover the area exactly.
+
     Raises
     ------
     InvalidMission
@@ -65,6 +70,8 @@ def mesh_area(
     local = shapely.transform(shapely.orient_polygons(area), lambda xy: xy - origin)
     border = shapely.segmentize(local, PITCH * edge_m)
     mesh = Triangulation.of(border).with_points(_lattice(local, border, PITCH * edge_m))
+    # Sizes first, then relaxation, which needs about as many points as there will be; angles last, as it changes
+    # them.
     mesh = relaxed(refined(mesh, edge_m, 0.0), edge_m, relaxations)
     mesh = refined(mesh, edge_m, math.radians(least_angle_deg))
     return Mesh.of(Triangulation(mesh.points + origin, mesh.triangles))

@@ -137,6 +137,7 @@ class Mesh:
 
     def part(self, which: Mask) -> Mesh:
         """Some of the triangles, as a mesh of their own; in the same order."""
+        # The last entry answers for a neighbour of -1, which indexes it from the end.
         rank = np.append(np.where(which, np.cumsum(which) - 1, -1), -1)
         return Mesh(self.points, self.triangles[which], rank[self.neighbours[which]])
 
@@ -158,6 +159,8 @@ class Mesh:
 
     def region(self, which: Mask) -> Polygon:
         """The union of some triangles that are connected by edges; exact, since no coordinate is computed anew."""
+        # Triangles of a mesh share edges exactly, which a coverage union relies on: far quicker, and without new
+        # points.
         merged = shapely.coverage_union_all(self.polygons[which])
         assert isinstance(merged, Polygon), "these triangles are not connected"
         return merged

@@ -43,6 +43,7 @@ def refined(mesh: Triangulation, edge_m: float, least_angle_rad: float) -> Trian
         too_long = lengths.max(axis=1) > edge_m * (1 + SIZE_TOLERANCE)
         bad = too_long | (mesh.least_sines < np.sin(least_angle_rad))
         terminal = np.unique(_terminal_sides(mesh)[bad])
+        # In narrow water, small angles are there to stay: without a floor, they would be halved for ever.
         terminal = terminal[lengths.ravel()[terminal] > 2 * FINEST * edge_m]
         if len(terminal) == 0:
             break

@@ -49,6 +49,11 @@ def propagate(mesh: Mesh, starts: Sequence[int] | Indices, within: Mask | None =
         Numbers of triangles, one per wave; of several waves on one triangle, the first has it.
     within
         The triangles that waves may enter, shape (m,); all by default.
+
+    Returns
+    -------
+    Wavefront
+        Unreached are triangles outside `within`, and those that it cuts off.
     """
     free = np.ones(len(mesh), dtype=bool) if within is None else within.copy()
     source, depth, branch = (np.full(len(mesh), UNREACHED, dtype=np.intp) for _ in range(3))
