@@ -97,7 +97,7 @@ def _danger_zones(zones: tuple[DangerZone, ...]) -> Layer:
         stage=STAGE,
         name="danger_zones",
         geometries=tuple(zone.area for zone in zones),
-        labels=tuple(f"{zone.name}: danger {zone.probability:g} a {zone.per}" for zone in zones),
+        labels=tuple(f"{zone.name}: danger {zone.probability:g} per {zone.per}" for zone in zones),
         values=tuple(zone.probability for zone in zones),
     )
 

@@ -13,6 +13,7 @@ __all__ = ["main"]
 def main() -> None:
     """Run the command; ends the process with its exit status."""
     ending.begin()  # before anything that takes time, imports included
+    # Before any output: a mission's name may hold characters that the terminal's encoding lacks.
     tolerate_any_text()
     from oxbow_cli.app import app  # noqa: PLC0415 - as above
     from oxbow_cli.exits import exit_status, explain  # noqa: PLC0415

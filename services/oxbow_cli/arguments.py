@@ -67,6 +67,11 @@ def position(text: str, where: str) -> Position:
     where
         The option that gave it, for errors.
 
+    Returns
+    -------
+    Position
+        Its range is checked with the mission.
+
     Raises
     ------
     InvalidMission
@@ -108,6 +113,11 @@ def plan_options(
     router
         The name of a `RouteMethod`.
 
+    Returns
+    -------
+    PlanOptions
+        With the heading in radians, and names as the enumerations' members.
+
     Raises
     ------
     InvalidMission
@@ -141,6 +151,16 @@ def with_prior(mission: Mission, prior: Path | None) -> Mission:
         The mission.
     prior
         GeoJSON or a raster; None leaves the mission as it is.
+
+    Returns
+    -------
+    Mission
+        The mission itself where `prior` is None.
+
+    Raises
+    ------
+    InvalidMission
+        The file cannot be read, or is no prior model.
     """
     return mission if prior is None else msgspec.structs.replace(mission, prior_model=read_prior(prior))
 
@@ -163,6 +183,7 @@ def replica_counts(texts: Iterable[str]) -> dict[str, int]:
     counts = {"path": max(2, os.cpu_count() or 1)}
     for text in texts:
         stage, _, count = text.partition("=")
+        # Whether the stage exists, and the count is at least 1, is for `StackSettings` to check.
         if not count.isdecimal():
             raise InvalidMission(f"is {text!r}; expected STAGE=N, as path=2", where="--replicas")
         counts[stage] = int(count)
@@ -189,6 +210,7 @@ def require_compatible(
     _require_seconds("--timeout", timeout_s)
     if time_limit_s is not None:
         _require_seconds("--time-limit", time_limit_s)
+    # The limit is for improving alone; what comes before and after it needs some of the timeout, too.
     if time_limit_s is not None and time_limit_s >= timeout_s:
         raise InvalidMission(
             f"is {time_limit_s:g} s; expected less than --timeout, {timeout_s:g} s", "--time-limit"
@@ -211,6 +233,7 @@ def _require_seconds(where: str, value: float) -> None:
 
 def read(path: Path) -> Mission:
     """The mission in a file; an error about the file as a whole is reported under the file's name."""
+    # Fields keep their names; only the file itself is called by its path.
     with renamed({"Mission File": str(path)}):
         return read_mission(path)
 

@@ -77,6 +77,11 @@ def compare(first: Mission, second: Mission, *, names: tuple[str, str] = ("first
     names
         How errors call the two.
 
+    Returns
+    -------
+    Comparison
+        Measures that are equal, or that either lacks, are better in neither.
+
     Raises
     ------
     InvalidMission
@@ -104,6 +109,9 @@ def compare(first: Mission, second: Mission, *, names: tuple[str, str] = ("first
 def _differences(first: Mission, second: Mission) -> Iterator[str]:
     """How two missions differ in what matters to the judgement of a path."""
     here, there = Site.of(first), Site.of(second)
+    # Outlines are in normal form: a contour that begins elsewhere is still the same. Planes are compared too,
+    # since
+    # equal coordinates in two of them are two places.
     if (here.frame, here.outline) != (there.frame, there.outline):
         areas_km2 = here.outline.area / 1e6, there.outline.area / 1e6
         yield "{}: {:.4g} and {:.4g} km2 within".format(first.outline_name, *areas_km2)
@@ -122,6 +130,7 @@ def _differences(first: Mission, second: Mission) -> Iterator[str]:
 def _broken_rules(found: Evaluation) -> Iterator[str]:
     if not found.is_simple:
         yield f"crosses itself ({found.crossings})"
+    # What a place ashore makes necessary is no breach; what goes beyond it is.
     necessary_m = sum(min(leg.ashore_m, leg.least_ashore_m) for path in found.vehicles for leg in path.legs)
     if found.outside_m - necessary_m > EQUAL_M:
         yield f"{found.outside_m - necessary_m:.1f} m outside"

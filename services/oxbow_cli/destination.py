@@ -37,6 +37,11 @@ class Destination:
         inputs
             Other files that the command reads or writes, and that must not be overwritten; None is skipped.
 
+        Returns
+        -------
+        Destination
+            With the digest of the file as it is now, by which `keep` knows whether another program has changed it.
+
         Raises
         ------
         InvalidMission
@@ -100,6 +105,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def _same(path: Path, other: Path) -> bool:
+    # By inode where both exist: hard links, and file systems that ignore case, have several names for one file.
     if path.exists() and other.exists():
         return path.samefile(other)
     return os.path.realpath(path) == os.path.realpath(other)
@@ -149,6 +155,7 @@ def _written_anew(folder: Path, path: Path, data: bytes) -> Path:
     """A new file with the data, named after another; nothing is left of it if it cannot be written."""
     for number in count(1):
         kept = folder / f"{path.stem}.planned{'' if number == 1 else f'-{number}'}{path.suffix}"
+        # Tried rather than looked up: another command may take the name between the look and the creation.
         with suppress(FileExistsError):
             with kept.open("xb"):  # reserves the name, even against another command
                 pass

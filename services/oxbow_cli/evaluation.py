@@ -63,6 +63,11 @@ def certify_request(mission: Mission, site: Site) -> CertifyRequest:
     site
         The site of this mission.
 
+    Returns
+    -------
+    CertifyRequest
+        In the site's plane, with each vehicle's own launch and recovery points.
+
     Raises
     ------
     InvalidMission
@@ -94,6 +99,8 @@ def evaluate(mission: Mission) -> Evaluation:
     ]
     first, certificate = vehicles[: len(teams[0])], certificates[0]
     measures = {name: getattr(certificate, name) for name in Measures.__struct_fields__} | {
+        # Geodesic: a plane makes lengths up to 4 parts in 10 000 too long, and what is promised is metres on the
+        # Earth.
         "length_m": sum(vehicle.length_m for vehicle in first),
         "duration_s": max(vehicle.duration_s for vehicle in first),
         "worst_gap": _worst_gap(certificate, site.frame),
@@ -130,6 +137,7 @@ def _paths(mission: Mission, site: Site) -> Iterator[_Path]:
     """The paths in the file, those of the first role first."""
     named = {planned.name: planned.path for planned in mission.planned_paths}
     members = {member.vehicle.name: member for member in site.members}
+    # Its ends, speed and length are not known, so that there is nothing to judge it by.
     if strangers := named.keys() - members.keys():
         raise InvalidMission(
             f"has a path of {min(strangers)!r}; expected one of {', '.join(members)}, those who take part",

@@ -77,6 +77,11 @@ class Unit:
             Of its paths.
         treats
             Whether the paths treat hot spots.
+
+        Returns
+        -------
+        Unit
+            Its length in metres.
         """
         if treats and mission.treated_swath_m is not None:
             return cls(mission.treated_swath_m / 2, "half swaths")
@@ -179,6 +184,7 @@ def _draw_distance(axes: Axes, region: MultiPolygon, paths: Paths, unit: Unit) -
     """The distance on a grid, clipped to the region."""
     (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
     pixel_m = (east - west) / 2000
+    # The magnified picture shows a small part of the region, which alone is computed, as finely as it is drawn.
     seen = shapely.clip_by_rect(region, west, south, east, north)
     west, south, east, north = seen.bounds
     step_m = max(math.sqrt(seen.area / _PLACES), pixel_m)
@@ -191,6 +197,7 @@ def _draw_distance(axes: Axes, region: MultiPolygon, paths: Paths, unit: Unit) -
     wanted = shapely.contains_xy(near, places[..., 0], places[..., 1])
     distance = np.full(wanted.shape, np.nan)
     distance[wanted] = PathDistance(paths)(places[wanted]) / unit.length_m
+    # A raster: between thousands of legs the distance has more ridges than contour lines could show.
     image = axes.imshow(
         distance,
         extent=(x[0] - step_m / 2, x[-1] + step_m / 2, y[0] - step_m / 2, y[-1] + step_m / 2),

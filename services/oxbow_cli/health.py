@@ -109,6 +109,8 @@ class Health(Closing):
                 for pid, child in asked.items()
                 if pid not in answered and (pid in self._known or child.age_s() > START_S)
             }
+        # All silences first, then the killing: to end a process takes time that must not count as another's
+        # silence.
         self._note(silent)
         for pid, child in silent.items():
             # The other thread may have replaced the process meanwhile: the new one is not to blame.
@@ -152,6 +154,7 @@ class Health(Closing):
 
     def _is_hung(self, pid: int) -> bool:
         silence = self._silences[pid]
+        # Since the silence began: a process that computes may answer late, one that hangs uses nothing.
         used_s = _used_s(pid) - silence.used_before_s
         is_busy = used_s > _BUSY_SHARE * silence.lasted_s
         return silence.lasted_s >= (BUSY_S if is_busy else SILENT_S)

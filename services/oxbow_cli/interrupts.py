@@ -57,11 +57,13 @@ class Ending:
             yield
         finally:
             self._held = False
+        # A signal that came meanwhile has waited for this.
         if self.status is not None:
             self._end(self.status)
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         is_first = self.status is None
+        # As shells report a death by a signal.
         self.status = 128 + number
         if not is_first:
             _leave(self.status)

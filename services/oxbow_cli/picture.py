@@ -84,8 +84,9 @@ def _draw_danger(axes: Axes, site: Site) -> None:
     for zone in site.danger_zones:
         water = zone.area.intersection(site.outline)
         axes.add_patch(sheet.patch(water, **style))
+        # Not the centroid, which may lie on land where the zone is bent.
         place = water.representative_point()
-        text = f"{zone.name}: danger {zone.probability:g} a {zone.per}"
+        text = f"{zone.name}: danger {zone.probability:g} per {zone.per}"
         sheet.note(axes, (place.x, place.y), text, colour=DANGER)
 
 
@@ -117,6 +118,8 @@ def _pieces(xy: FloatArray) -> list[FloatArray]:
     at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
     cuts = np.linspace(0.0, at[-1], _COLOURS + 1)
     ends = np.column_stack([np.interp(cuts, at, xy[:, axis]) for axis in (0, 1)])
+    # Each piece has its two interpolated ends, and the vertices strictly between: neighbours share an end
+    # exactly.
     first = np.searchsorted(at, cuts, side="right")
     return [
         np.vstack([ends[k], xy[start : max(start, np.searchsorted(at, cuts[k + 1]))], ends[k + 1]])
@@ -167,6 +170,8 @@ def _draw_names_key(figure: Figure, names: list[str]) -> None:
         labelspacing=0.3,
     )
     for text, name in zip(key.get_texts(), names, strict=True):
+        # A name with two dollar signs would be set as a formula, or raise an error; the legend offers no other
+        # way.
         text.set_parse_math(False)
         text.set_text(name)
 

@@ -101,6 +101,11 @@ def plan_on(job: PlanningJob, endpoint: str) -> PlannedMission:
     endpoint
         Where the stack's router listens.
 
+    Returns
+    -------
+    Planned
+        Without a recording: that is with the stack, perhaps on another machine.
+
     Raises
     ------
     DeadlineExceeded
@@ -132,8 +137,21 @@ def plan_embedded(job: PlanningJob, recording: Path | None, recordings: Path) ->
         Where the recording goes; None for the folder `recordings`, under the mission's ID.
     recordings
         The folder of recordings that are not given a place.
+
+    Returns
+    -------
+    Planned
+        With its recording, where that could be kept.
+
+    Raises
+    ------
+    DeadlineExceeded
+        There is no plan within the job's time.
+    Unavailable
+        The stack did not start.
     """
     with ending.orderly(), scratch_folder() as scratch:
+        # A store of its own: the user's may be held by a stack that is up.
         settings = StackSettings(endpoint=free_endpoint(), home=scratch, recordings=scratch)
         with running_stack(settings, output=None if DEBUG in os.environ else subprocess.DEVNULL):
             planned = plan_on(job, settings.endpoint).mission
@@ -196,6 +214,7 @@ def _deadline(timeout_s: float) -> Iterator[None]:
         raise _too_late(timeout_s)
 
     signal.signal(signal.SIGALRM, give_up)
+    # The handler runs between two bytecodes: a long call into GEOS delays it, but cannot escape it.
     signal.setitimer(signal.ITIMER_REAL, timeout_s)
     try:
         yield

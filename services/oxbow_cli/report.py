@@ -81,6 +81,11 @@ def plan_document(planned: PlannedMission, file: Path) -> dict[str, Any]:
         The completed mission.
     file
         Where it was written.
+
+    Returns
+    -------
+    dict of str to object
+        ``file``, ``recording`` (None without one) and ``Plan``, for `print_json`.
     """
     return {"file": file, "recording": planned.recording, "Plan": planned.mission.plan}
 
@@ -211,6 +216,11 @@ def comparison_document(files: tuple[Path, Path], found: Comparison) -> dict[str
         The two files.
     found
         Their comparison, in the same order.
+
+    Returns
+    -------
+    dict of str to object
+        ``files``, and the fields of the comparison, for `print_json`.
     """
     return {"files": files} | msgspec.structs.asdict(found)
 

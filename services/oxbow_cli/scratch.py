@@ -21,6 +21,7 @@ _LEAST_AGE_S = 60.0
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
     """A temporary folder, locked by this process for as long as it lives."""
+    # Here and not at the end: a command that is killed cannot clean up, but the next one can.
     _sweep(Path(tempfile.gettempdir()))
     with tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True) as name:
         descriptor = os.open(name, os.O_RDONLY | os.O_DIRECTORY)

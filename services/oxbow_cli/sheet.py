@@ -93,6 +93,11 @@ def checked_format(path: Path, width_px: int) -> str:
     width_px
         Its width, >= 1.
 
+    Returns
+    -------
+    str
+        As matplotlib calls it: ``png`` or ``svg``.
+
     Raises
     ------
     InvalidMission
@@ -118,7 +123,9 @@ def save_sheet(figure: Figure, path: Path, width_px: int) -> None:
         Width of the picture, in pixels.
     """
     kind = checked_format(path, width_px)
+    # Drawn in memory first: a picture that fails half way leaves the old file as it was.
     picture = io.BytesIO()
+    # Without a date, the same mission gives the same file.
     metadata = {"Date": None} if kind == "svg" else {}
     figure.savefig(picture, format=kind, dpi=_DPI * width_px / 2000, metadata=metadata)
     with ending.held():
@@ -133,6 +140,7 @@ def new_sheet(site: Site) -> tuple[Figure, Axes]:
     margin = 0.04 * max(east - west, north - south)
     width_m, height_m = east - west + 2 * margin, north - south + 2 * margin
     width_in = 2000 / _DPI
+    # Bounded: a river of 20 km by 200 m would give a strip, or a sheet that no screen shows.
     map_in = width_in * min(max(height_m / width_m, 0.4), 1.25)
     height_in = map_in + _HEADER_IN + _FOOTER_IN
     figure = Figure(figsize=(width_in, height_in), facecolor=LAND)
@@ -185,6 +193,7 @@ def patch(geometry: BaseGeometry, **style: object) -> PathPatch:
     """Polygons with their holes as one patch; `style` is that of `PathPatch`."""
     polygons = [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon)]
     rings = [ring for polygon in polygons for ring in (polygon.exterior, *polygon.interiors)]
+    # One compound path, not polygons over polygons: a hole must show what is below, not the colour of land.
     outlines = [Outline(shapely.get_coordinates(ring), closed=True) for ring in rings if not ring.is_empty]
     return PathPatch(Outline.make_compound_path(*outlines), **style)
 
@@ -300,6 +309,11 @@ def line_width(axes: Axes, spacing_m: float) -> float:
         The map.
     spacing_m
         The spacing of legs.
+
+    Returns
+    -------
+    float
+        In points, from 0.35 to 1.6.
     """
     west, east = axes.get_xlim()
     points_per_m = axes.figure.get_window_extent().width / axes.figure.dpi * 72 / (east - west)
@@ -380,6 +394,7 @@ def _fit(figure: Figure, text: Text) -> None:
         text.set_text(f"{whole[:shown]}…")
     if (width := text.get_window_extent().width) > room:
         text.set_fontsize(max(float(text.get_fontsize()) * room / width, _SMALLEST_PT))
+    # Measured after each cut, since characters differ in width.
     while (width := text.get_window_extent().width) > room and shown > 1:
         shown = max(1, int(min(shown, len(text.get_text()) - 1) * room / width))
         text.set_text(f"{whole[:shown].rstrip()}…")

@@ -78,6 +78,11 @@ def running_stack(settings: StackSettings, output: int | None = None) -> Iterato
     output
         A file descriptor for the logs of the processes; by default this process's stderr.
 
+    Yields
+    ------
+    None
+        Once every process has been seen alive on the bus.
+
     Raises
     ------
     Unavailable
@@ -89,6 +94,7 @@ def running_stack(settings: StackSettings, output: int | None = None) -> Iterato
         give_up = time.monotonic() + START_S
         with _connected(settings.endpoint, supervisor, give_up) as bus:
             _wait_ready(bus, started.services, supervisor, give_up)
+        # Only now: while a stack starts, an end is an error to report, and not one to mend.
         watch = Health(settings.endpoint, started.router, [each.child for each in started.services])
         supervisor.keep_alive()
         supervisor.repeat(watch.ask, PERIOD_S, "pings", at_end=watch.close)

@@ -50,6 +50,7 @@ class StackStatus(msgspec.Struct, frozen=True, kw_only=True):
 def status_of(endpoint: str) -> StackStatus:
     """Ask everything that is alive on the bus at `endpoint`; raises `Unavailable` if there is no router."""
     with Bus.connect(endpoint, timeout_s=ANSWER_S) as bus:
+        # Missing services are part of the answer; the wait is only for those that are there to be seen.
         with suppress(Unavailable):
             bus.wait_ready(SERVICES, SEEN_S)
         supervisions = _ask(bus, "processes", Supervision).values()

@@ -169,6 +169,11 @@ class Supervisor:
         name, arguments, rank
             See `Child`.
 
+        Returns
+        -------
+        Child
+            Running; restarted only once `keep_alive` has been called.
+
         Raises
         ------
         Unavailable
@@ -214,6 +219,7 @@ class Supervisor:
             finally:
                 at_end()
 
+        # A thread for each child: one that is slow to start must not hold up the restart of another.
         thread = threading.Thread(target=run, name=name, daemon=True)
         self._threads.append(thread)
         thread.start()
@@ -252,6 +258,7 @@ class Supervisor:
 
     def _stop(self, group: Sequence[Child], grace_s: float) -> None:
         give_up = time.monotonic() + grace_s
+        # All of a rank are asked before any is waited for: they end side by side, within one grace.
         for child in group:
             child.terminate()
         for child in group:

@@ -28,11 +28,17 @@ def find_recording(name: str, folder: Path) -> Path:
     folder
         Where recordings are kept.
 
+    Returns
+    -------
+    Path
+        Of a file that exists.
+
     Raises
     ------
     InvalidMission
         There is no such recording, or the name is not an ID; names some that exist.
     """
+    # An id has passed `checked_id`, so that it cannot lead out of the folder; a path is the user's own.
     path = Path(name) if name.endswith(".rrd") else folder / f"{checked_id(name, where='ID')}.rrd"
     try:
         if path.is_file():

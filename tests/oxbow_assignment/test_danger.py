@@ -171,7 +171,7 @@ def test_zones_and_the_routes_of_every_method_are_shown():
     request = replaced(REQUEST, danger_zones=(zone(),))
     (sortie,) = handle(request, layers.append).sorties
     shown = {layer.name: layer for layer in layers}
-    assert shown["danger_zones"].labels == ("reef: danger 0.5 a crossing",)
+    assert shown["danger_zones"].labels == ("reef: danger 0.5 per crossing",)
     assert shown["danger_zones"].values == (0.5,)
     routes = {method: shown[f"routes_{method}"] for method in RouteMethod}
     for layer in routes.values():
