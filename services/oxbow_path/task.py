@@ -21,7 +21,8 @@ from oxbow.geometry.route.gate_routes import Routes
 from oxbow.geometry.sweep import from_sweep, to_sweep
 from oxbow.wire.recording import Layer, LayerKind, Show
 from oxbow_path.refinement import RefinementStep, Samples
-from oxbow_path.walk.legs import Passable, access
+from oxbow_path.walk.access import access
+from oxbow_path.walk.legs import Passable
 from oxbow_path.walk.probe import Probe
 from oxbow_path.walk.spacing import Budget
 from oxbow_path.walk.trial import Waters

@@ -25,6 +25,7 @@ from oxbow.arrays import FloatArray, Geometries, Place
 from oxbow.contracts import Fault, Leg, Rule
 from oxbow.geometry.narrows import DETOUR, direct_leg_m, is_basin, without_narrows
 from oxbow.geometry.route.gate_routes import Routes
+from oxbow.geometry.stretches import PathSegments, clipped, covered_m, gaps_between, merged
 from oxbow.tolerances import ROUNDING_M
 
 __all__ = ["Conduct", "Shore", "crossings_of", "strays"]
@@ -124,7 +125,7 @@ class Shore:
         launch, recovery
             Where the vehicle starts and ends. A path that begins or ends more than 1 m away has no leg there.
         """
-        segments = _Segments.of(path)
+        segments = PathSegments.of(path)
         outside = self._outside(segments)
         unsafe = self._unsafe(segments, outside)
         total_m = segments.length_m
@@ -134,31 +135,31 @@ class Shore:
         out_m, home_m = np.where(off_m > SAME_PLACE_M, 0.0, self._leg_lengths(path, unsafe)).tolist()
         ends = (_End("launch", launch, 0.0, out_m), _End("recovery", recovery, total_m, total_m - home_m))
         legs = [
-            self._leg(end, path, _within(outside, *end.stretch), _within(unsafe, *end.stretch)) for end in ends
+            self._leg(end, path, clipped(outside, *end.stretch), clipped(unsafe, *end.stretch)) for end in ends
         ]
         between = ends[0].open_m, ends[1].open_m
         faults = [
-            *_stretch_faults(Rule.OUTSIDE, path, _within(outside, *between)),
-            *_stretch_faults(Rule.UNSAFE, path, _within(unsafe, *between)),
+            *_stretch_faults(Rule.OUTSIDE, path, clipped(outside, *between)),
+            *_stretch_faults(Rule.UNSAFE, path, clipped(unsafe, *between)),
             *(fault for end, leg in zip(ends, legs, strict=True) for fault in _leg_faults(end, leg, path)),
             *crossings_of(path),
         ]
         excess_m = sum(fault.metres for fault in faults if fault.rule is Rule.UNSAFE)
-        return Conduct(_length_m(outside), excess_m, (legs[0], legs[1]), tuple(faults))
+        return Conduct(covered_m(outside), excess_m, (legs[0], legs[1]), tuple(faults))
 
-    def _outside(self, segments: _Segments) -> FloatArray:
+    def _outside(self, segments: PathSegments) -> FloatArray:
         """Stretches that lie in no water: a path changes sides only where it is near to the shore."""
-        beyond = _rest(self._near(segments, SHORE_TOLERANCE_M), segments.length_m)
+        beyond = gaps_between(self._near(segments, SHORE_TOLERANCE_M), segments.length_m)
         return beyond[~shapely.contains_xy(self.water, segments.at(beyond.mean(axis=1)))]
 
-    def _unsafe(self, segments: _Segments, outside: FloatArray) -> FloatArray:
+    def _unsafe(self, segments: PathSegments, outside: FloatArray) -> FloatArray:
         distance_m = SAFETY_SHARE * self.safety_m
         if distance_m <= SHORE_TOLERANCE_M:
             return outside
         # Far inland no shore is near: only together do the two cover a path over land.
-        return _merged(np.vstack([outside, self._near(segments, distance_m)]))
+        return merged(np.vstack([outside, self._near(segments, distance_m)]))
 
-    def _near(self, segments: _Segments, distance_m: float) -> FloatArray:
+    def _near(self, segments: PathSegments, distance_m: float) -> FloatArray:
         """Stretches of a path that are nearer to the shore than a distance."""
         found = [np.empty((0, 2))]
         # In parts: in a path that is one tangle along the shore, pairs grow with the square of its length.
@@ -169,7 +170,7 @@ class Shore:
             bands = shapely.buffer(self._runs.geometries[near], distance_m, quad_segs=QUAD_SEGS)
             parts, pair = shapely.get_parts(shapely.intersection(lines[segment], bands[back]), return_index=True)
             found.append(segments.stretches(parts, first + segment[pair]))
-        return _merged(np.vstack(found))
+        return merged(np.vstack(found))
 
     def _leg_lengths(self, path: LineString, unsafe: FloatArray) -> tuple[float, float]:
         """How far a path's first and its last leg reach.
@@ -216,12 +217,12 @@ class Shore:
     def _leg(self, end: _End, path: LineString, outside: FloatArray, unsafe: FloatArray) -> Leg:
         """A leg, and what its place makes necessary."""
         water = self._parts[np.argmin(shapely.distance(self._parts, path.interpolate(end.open_m)))]
-        unsafe_m, ashore_m = _length_m(unsafe), float(water.distance(Point(end.place)))
+        unsafe_m, ashore_m = covered_m(unsafe), float(water.distance(Point(end.place)))
         direct_m = direct_leg_m(self.safety_m, ashore_m)
         # The shortest way takes a triangulation: computed only where the direct length does not excuse the leg.
         return Leg(
             unsafe_m=unsafe_m,
-            ashore_m=_length_m(outside),
+            ashore_m=covered_m(outside),
             least_ashore_m=self._least_ashore_m(Point(end.place)),
             most_unsafe_m=direct_m if unsafe_m <= direct_m else direct_m + DETOUR * self._shortest_m(end, path),
         )
@@ -271,45 +272,6 @@ class _End:
         return min(self.at_m, self.open_m), max(self.at_m, self.open_m)
 
 
-@dataclass(frozen=True)
-class _Segments:
-    """A path's segments: `lines` (n,), their ends (n, 2, 2), and how far along the path each begins, (n,)."""
-
-    lines: Geometries
-    ends: FloatArray
-    start_m: FloatArray
-    length_m: float
-
-    @classmethod
-    def of(cls, path: LineString) -> _Segments:
-        """The segments of a path that have a length."""
-        xy = shapely.get_coordinates(path)
-        ends = np.stack([xy[:-1], xy[1:]], axis=1)
-        # A repeated point makes a segment without a direction, by whose length `at` would divide.
-        ends = ends[(ends[:, 0] != ends[:, 1]).any(axis=1)]
-        length_m = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
-        end_m = np.cumsum(length_m)
-        return cls(np.asarray(shapely.linestrings(ends)), ends, end_m - length_m, float(end_m[-1]))
-
-    def at(self, along_m: FloatArray) -> FloatArray:
-        """Places (n, 2) at distances along the path."""
-        segment = np.clip(np.searchsorted(self.start_m, along_m, side="right") - 1, 0, None)
-        start, end = self.ends[segment].transpose(1, 0, 2)
-        step = end - start
-        share = (along_m - self.start_m[segment]) / np.hypot(*step.T)
-        return np.asarray(start + share[:, None] * step)
-
-    def stretches(self, parts: Geometries, segment: np.ndarray) -> FloatArray:
-        """Where along the path parts of its segments begin and end, (n, 2)."""
-        lines = shapely.get_type_id(parts) == shapely.GeometryType.LINESTRING
-        lines &= ~shapely.is_empty(parts)
-        parts, segment = parts[lines], segment[lines]
-        ends = np.stack([shapely.get_coordinates(shapely.get_point(parts, at)) for at in (0, -1)], axis=1)
-        along = np.hypot(*(ends - self.ends[segment, :1]).transpose(2, 0, 1)) + self.start_m[segment, None]
-        # An overlay may return a part in either direction.
-        return np.asarray(np.sort(along, axis=1))
-
-
 def strays(path: LineString, free: Polygon, launch: Place, recovery: Place) -> list[BaseGeometry]:
     """The stretches of a path outside a free space that are not legs: they touch neither launch nor recovery.
 
@@ -322,7 +284,7 @@ def strays(path: LineString, free: Polygon, launch: Place, recovery: Place) -> l
     launch, recovery
         What begins or ends at one of these places is a leg.
     """
-    segments = np.asarray(_Segments.of(path).lines)
+    segments = np.asarray(PathSegments.of(path).lines)
     grown = free.buffer(ROUNDING_M)
     shapely.prepare(grown)
     leaving = segments[~shapely.covers(grown, segments)]
@@ -340,7 +302,7 @@ def crossings_of(path: LineString) -> tuple[Fault, ...]:
     """
     if shapely.is_simple(path):
         return ()
-    lines = _Segments.of(path).lines
+    lines = PathSegments.of(path).lines
     last = len(lines) - 1
     tree = STRtree(lines)
     count, place = 0, shapely.get_coordinates(path)[-1]
@@ -357,7 +319,7 @@ def crossings_of(path: LineString) -> tuple[Fault, ...]:
 
 
 def _stretch_faults(rule: Rule, path: LineString, stretches: FloatArray) -> Iterator[Fault]:
-    metres = _length_m(stretches)
+    metres = covered_m(stretches)
     if metres > SHORE_TOLERANCE_M:
         longest = stretches[np.argmax(stretches[:, 1] - stretches[:, 0])]
         place = path.interpolate(longest.mean())
@@ -380,33 +342,3 @@ def _runs_of(ring: FloatArray) -> Geometries:
     sizes = np.minimum(first + RUN, len(ring) - 1) - first + 1
     point = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes - first, sizes)
     return np.asarray(shapely.linestrings(ring[point], indices=np.repeat(np.arange(len(first)), sizes)))
-
-
-# --------------------------------------------------------------------------- stretches: (n, 2) metres along a path
-
-
-def _merged(stretches: FloatArray) -> FloatArray:
-    """The same stretches in order, with those that meet joined."""
-    if len(stretches) == 0:
-        return stretches
-    stretches = stretches[np.argsort(stretches[:, 0], kind="stable")]
-    # A stretch may lie inside an earlier one: what counts is the farthest end so far.
-    reach = np.maximum.accumulate(stretches[:, 1])
-    first = np.flatnonzero(np.concatenate([[True], stretches[1:, 0] > reach[:-1]]))
-    return np.column_stack([stretches[first, 0], reach[np.append(first[1:] - 1, len(reach) - 1)]])
-
-
-def _rest(stretches: FloatArray, total_m: float) -> FloatArray:
-    """The stretches of a path between some ordered ones."""
-    rest = np.column_stack([np.append(0.0, stretches[:, 1]), np.append(stretches[:, 0], total_m)])
-    return np.asarray(rest[rest[:, 1] > rest[:, 0]])
-
-
-def _within(stretches: FloatArray, start_m: float, end_m: float) -> FloatArray:
-    """Some stretches, clipped to another."""
-    clipped = np.clip(stretches, start_m, max(start_m, end_m))
-    return np.asarray(clipped[clipped[:, 1] > clipped[:, 0]])
-
-
-def _length_m(stretches: FloatArray) -> float:
-    return float((stretches[:, 1] - stretches[:, 0]).sum())

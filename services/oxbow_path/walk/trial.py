@@ -14,8 +14,9 @@ from shapely.geometry.base import BaseGeometry
 from oxbow.contracts import Cell
 from oxbow.geometry.route.gate_routes import Routes
 from oxbow.tolerances import ROUNDING_M
+from oxbow_path.walk.access import Access
 from oxbow_path.walk.gaps import branch_to, reach_gaps
-from oxbow_path.walk.legs import Access, Passable, is_plainly_simple, joined
+from oxbow_path.walk.legs import Passable, is_plainly_simple, joined
 from oxbow_path.walk.probe import Probe
 from oxbow_path.walk.region import Brush, Circuit, Walk, clear_of_land, dilated, largest, simply_connected
 

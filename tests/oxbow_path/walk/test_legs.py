@@ -10,7 +10,8 @@ from oxbow.geometry.conformance import strays
 from oxbow.geometry.route.gate_routes import Routes
 from oxbow.wire.recording import discard
 from oxbow_path.service import handle
-from oxbow_path.walk.legs import Passable, access, joined
+from oxbow_path.walk.access import access
+from oxbow_path.walk.legs import Passable, joined
 from tests.support.path_requests import request
 
 WATER = box(0, 0, 1000, 600)
