@@ -47,6 +47,15 @@ def test_meetings_are_those_by_definition(ring, other):
     assert found(edges, of=of_first) == {pair for pair in expected if of_first[list(pair)].any()}
 
 
+@pytest.mark.parametrize("sample", [1, 8, 20, 40])
+def test_a_sample_finds_all_meetings_of_its_edges(sample):
+    """Forty lines through one place: every two meet."""
+    angles = np.linspace(0.0, 3.0, 40)
+    ends = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    pairs = found(Edges(np.stack([ends, -ends], axis=1), np.arange(40)), sample=sample)
+    assert len(pairs) == sum(39 - looked_up for looked_up in range(sample))
+
+
 @settings(max_examples=150)
 @given(rings.filter(lambda ring: len(ring) > 2))
 @pytest.mark.parametrize("most_pairs", [crossings.MOST_PAIRS, 8])
