@@ -74,7 +74,8 @@ def simplify(water: Sequence[Polygon], tolerance_m: float) -> Simplified:
     while True:
         simple = [points[s : c + 1][is_kept[s : c + 1]] for s, c in zip(starts, closing, strict=True)]
         parts = [Polygon(group[0], group[1:]) for group in _grouped(simple, counts)]
-        is_sound = len(parts) == 1 and parts[0].is_valid  # then no two edges meet: no need to look for them
+        # Of a sound one no two edges meet: no need to look for them.
+        is_sound = len(parts) == 1 and bool(shapely.is_valid(parts[0]))
         edges = _Edges.between(points, is_kept, starts, closing)
         faulty = edges.is_wide(tolerance_m)
         if not faulty.any() and not is_sound:
@@ -151,7 +152,7 @@ def _without_islands(polygon: Polygon) -> Polygon | MultiPolygon:
 
     An island nearer to the shore than the tolerance may have changed sides without crossing it.
     """
-    if polygon.is_valid:
+    if shapely.is_valid(polygon):
         return polygon
     rest = Polygon(polygon.exterior).difference(shapely.union_all([Polygon(ring) for ring in polygon.interiors]))
     return MultiPolygon([part for part in shapely.get_parts(rest) if isinstance(part, Polygon)])

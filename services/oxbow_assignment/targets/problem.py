@@ -80,7 +80,7 @@ class Problem:
     costs: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        require_vehicles(self.vehicles)
+        _require_vehicles(self.vehicles)
         for own in self.distances.reshape(-1, *self.distances.shape[-2:]):
             require_distances(own)
         if self.distances.shape[-1] < 2 * len(self.vehicles):
@@ -225,7 +225,7 @@ class Problem:
         return self.has_role & (self.there_and_back_m <= self.lengths_m[:, None])
 
 
-def require_vehicles(vehicles: Sequence[Vehicle]) -> None:
+def _require_vehicles(vehicles: Sequence[Vehicle]) -> None:
     """Check that there are vehicles, and that no two have the same name.
 
     Raises

@@ -52,8 +52,7 @@ def enclosed(way: FloatArray, free: Polygon, lane_m: float) -> Polygon:
         return largest(Point(way[0]).buffer(lane_m).intersection(free))
     stretches = shapely.get_parts(shapely.union_all([LineString(way)], grid_size=GRID_M))
     faces = shapely.get_parts(shapely.polygonize(stretches))
-    # An empty polygon first: a way that encloses nothing has no faces to unite.
-    region = shapely.union_all([Polygon(), *faces[_is_odd(faces, way)]])
+    region = shapely.union_all(faces[_is_odd(faces, way)])
     boundary = region.boundary
     shapely.prepare([region, boundary])
     twice = stretches[~shapely.covers(boundary, stretches)]

@@ -85,7 +85,7 @@ class DynamicRouter:
         Infeasible
             It would cover all the water that is left; the obstacles stay as they are.
         """
-        if area.is_empty or not area.is_valid:
+        if area.is_empty or not shapely.is_valid(area):
             raise InvalidMission("is empty or not a valid polygon", where=name)
         self._change(name, shapely.set_precision(area, GRID_M))
 

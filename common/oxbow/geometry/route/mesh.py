@@ -100,7 +100,7 @@ class WaterMesh:
         InvalidMission
             The water is empty or not a valid polygon.
         """
-        if water.is_empty or not water.is_valid:
+        if water.is_empty or not shapely.is_valid(water):
             raise InvalidMission("is empty or not a valid polygon", where="water")
         faces = _parted(water, outlines) if outlines else water
         points, triangles = triangulated(faces if math.isinf(detail_m) else shapely.segmentize(faces, detail_m))

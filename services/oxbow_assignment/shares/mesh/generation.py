@@ -78,7 +78,7 @@ def mesh_area(
 
 
 def _require_fit(area: Polygon, edge_m: float, least_angle_deg: float) -> None:
-    if area.is_empty or not area.is_valid or area.area == 0.0:
+    if area.is_empty or not shapely.is_valid(area) or area.area == 0.0:
         raise InvalidMission("is empty or not a valid polygon; expected one with an area", where="area")
     if not 0.0 < edge_m < math.inf:
         raise InvalidMission(f"is {edge_m!r}; expected a finite number > 0.0", where="edge_m")
