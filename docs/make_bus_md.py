@@ -86,13 +86,13 @@ Oxbow's processes meet on [Zenoh](https://zenoh.io) 1.x, each in `client` mode a
 - Ids are 1 to {MOST_ID_CHARACTERS} of `A-Z a-z 0-9 _ . -`, the first of them not `.`.
 - No request is larger than {MAX_REQUEST_BYTES // 2**20} MiB.
 - An error is an error reply with an `ErrorReply` in JSON; any other encoding marks an error of Zenoh's own.
-- Publications are heard at most once, and anyone may put: follow a plan only as the history has it, and ask for
-  what is new there after each publication, each loss of the link, and now and then, as `oxbow.Client` does.
-- A query that has no reply at all was lost: ask again. Requests may be repeated under one `request_id`.
+- Publications arrive at most once, and anyone may publish: follow a plan only as the history has it, and ask for
+  what is new there after each publication, after each loss of the link, and at intervals, as `oxbow.Client` does.
+- A query without any reply was lost: ask again. Requests may be repeated under one `request_id`.
 - A stage with several replicas has a key for each. The caller chooses one that is alive, the one with the fewest
-  of its requests, and asks another where the first is busy or lost. `oxbow.bus.client.Bus.call` does all of this.
+  of its requests, and asks another if the first is busy or lost. `oxbow.bus.client.Bus.call` does all of this.
 - Chunks that begin with `@` are matched by no wildcard: `oxbow/v1/stage/*/*` asks stages to work, and
-  `{any_introspection_key("ping")}` asks them, the mission service and the recorder how they are.
+  `{any_introspection_key("ping")}` asks them, the mission service and the recorder for their state.
 """
 
 INNER = (
@@ -165,11 +165,12 @@ def _keys() -> str:
 def _missions() -> Iterator[str]:
     yield textwrap.dedent(
         f"""\
-        A Mission File is described in [mission-file.md](mission-file.md). Put to `{_mission("request")}`, it is
-        answered by the mission's status alone; asked of the same key, by a `MissionStatus` in reply too; asked of
-        `{PLAN_KEY}`, by the completed Mission File, once it is there. A put to `{_mission("cancel")}` ends
-        whatever of the mission waits or is being planned: it `failed`, `cancelled`. A query may carry the
-        parameters below: `{PLAN_KEY}?{SubmissionParameters(id="lake", seed=3, deadline_s=60.0).text}`.
+        The Mission File is described in [mission-file.md](mission-file.md). If one is put to
+        `{_mission("request")}`, the mission's status is published. A query to the same key is also replied to
+        with a `MissionStatus`, and a query to `{PLAN_KEY}` with the completed Mission File, once there is one. A
+        put to `{_mission("cancel")}` ends whatever of the mission waits or is being planned: it has `failed`, with
+        the error `cancelled`. A query may carry the parameters below:
+        `{PLAN_KEY}?{SubmissionParameters(id="lake", seed=3, deadline_s=60.0).text}`.
         """
     )
     yield _message(SubmissionParameters)
@@ -179,8 +180,8 @@ def _missions() -> Iterator[str]:
 def _stages() -> Iterator[str]:
     yield (
         "A request to a stage travels with an `Envelope` (JSON) as the query's attachment. A reply has the"
-        " request's id attached, an error carries it as a `StageError`: nothing else is an answer. Another"
-        " request under the same id is refused. A key below an instance's that is none is answered by an error.\n"
+        " request's id attached, and an error carries it as a `StageError`: nothing else is an answer. Another"
+        " request under the same id is refused. An unknown key below an instance's is answered with an error.\n"
     )
     yield _message(Envelope)
     yield _message(StageError)
@@ -193,10 +194,10 @@ def _stages() -> Iterator[str]:
             if kind not in seen:
                 seen.add(kind)
                 yield _message(kind, level=4)
-    yield "### What a stage tells about itself\n"
+    yield "### What a stage reports about itself\n"
     yield (
-        "`@schema` replies a JSON Schema of both messages. All replicas of all stages are asked with"
-        f" `{any_introspection_key('stats')}`; who is alive is the liveliness of `{ANY_LIVE}`.\n"
+        "`@schema` replies with a JSON Schema of both messages. All replicas of all stages are asked with"
+        f" `{any_introspection_key('stats')}`; the liveliness of `{ANY_LIVE}` shows which are alive.\n"
     )
     for kind in (Ping, Info, Stats, Supervision, Supervised):
         yield _message(kind, level=4)
@@ -205,8 +206,8 @@ def _stages() -> Iterator[str]:
 def _layers() -> Iterator[str]:
     yield (
         f"What a stage shows of its work, for recorders and viewers: subscribe to `{ANY_LAYER}`. Layers are sent"
-        " after all other traffic, and dropped rather than waited for. Without a subscriber, or in a request"
-        " without a mission, none is made.\n"
+        " after all other traffic, and are dropped rather than waited for. Without a subscriber, or for a request"
+        " without a mission, none are made.\n"
     )
     yield _message(Stamped)
     yield _message(Layer)
@@ -251,7 +252,7 @@ def _message(kind: type[msgspec.Struct], level: int = 3) -> str:
 
 
 def _docstring(kind: type) -> tuple[str, dict[str, str]]:
-    """What a numpydoc docstring says of the class, and of each of its parameters."""
+    """What a numpydoc docstring says about the class, and about each of its parameters."""
     meaning, _, parameters = inspect.cleandoc(kind.__doc__ or "").partition("\nParameters\n----------\n")
     fields: dict[str, str] = {}
     for names, text in re.findall(r"^(\w[\w, ]*)\n((?:    .*\n?)+)", parameters + "\n", flags=re.MULTILINE):

@@ -153,7 +153,7 @@ def draw_plans(file: Path) -> None:
 
 
 def _caption(measures: Certificate) -> str:
-    """What tells the sample plans apart."""
+    """How the sample plans differ."""
     simple = "" if measures.is_simple else f", {measures.crossings} crossings"
     return (
         f"q {measures.q:.2f}   p95 {measures.p95_ratio:.2f}   mean {measures.mean_ratio:.2f}{simple}\n"
