@@ -2,6 +2,8 @@
 
 Targets are given by pseudo-coordinates (Innocenti, Pollini and Bracci 2006, section 4.4). Each has a weight
 between 0 and 1, which fades after a visit, so that the centres move smoothly and clusters do not churn.
+
+Missions are planned with k-means over equal weights. The rest is for replans on the way; no mission uses it yet.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 The Hungarian method alone may turn a vehicle round before it has visited anything (Innocenti, Pollini and
 Bracci 2006, section 4.2). So a vehicle keeps its current target, the first of its tour, unless giving it up gains
 more than a hysteresis.
+
+This is for replans on the way; no mission uses it yet.
 """
 
 from __future__ import annotations

@@ -44,6 +44,7 @@ def test_content_makes_a_difference(change: dict[str, Any]) -> None:
 
 def test_options_make_a_difference_but_not_the_id_or_the_deadline() -> None:
     assert submission(seed="1").fingerprint != submission().fingerprint
+    assert submission(router="funnel").fingerprint != submission().fingerprint
     assert submission(heading_rad="0.5").fingerprint != submission().fingerprint
     assert submission(time_limit_s="5").fingerprint != submission().fingerprint
     assert submission(deadline_s="7", id="lake").fingerprint == submission().fingerprint
@@ -92,6 +93,7 @@ def test_parameters_survive_the_way_through_a_selector(given_parameters: Submiss
         ({"sed": "1"}, "sed"),
         ({"seed": "many"}, "seed=many"),
         ({"method": "Spiral"}, "Spiral"),
+        ({"router": "compass"}, "compass.*router"),
         ({"deadline_s": "0"}, "deadline_s: is 0.0"),
         ({"deadline_s": "nan"}, "deadline_s: is nan"),
         ({"deadline_s": "inf"}, "deadline_s: is inf"),
