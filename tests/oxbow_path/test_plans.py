@@ -15,7 +15,6 @@ from oxbow_path.service import handle
 from tests.support.path_requests import lake, nasty_request, request, soon_planned
 
 quick = settings(max_examples=8)
-few = settings(max_examples=3)
 
 
 def require_sound(plan: PathPlan, asked: PathRequest) -> None:
@@ -37,26 +36,27 @@ def farthest(plan: PathPlan, asked: PathRequest) -> float:
     return float(shapely.distance(plan.path, shapely.points(shore)).max())
 
 
-@few
+@quick
 @given(seed=st.integers(0, 10_000), spacings=st.floats(10, 18), safety=st.sampled_from([0.0, 0.005, 0.02]))
 @pytest.mark.parametrize("method", Method)
 def test_out_and_back(method, seed, spacings, safety):
-    asked = request(lake(seed), spacings=spacings, safety=safety, method=method)
-    plan = handle(asked, discard)
+    asked = request(lake(seed), spacings=spacings, safety=safety, method=method, time_limit_s=1.0)
+    plan = soon_planned(asked)
     require_sound(plan, asked)
     assert plan.path.length >= 0.95 * asked.length_m
     assert farthest(plan, asked) <= 2.2 * plan.spacing_m
 
 
-@few
+@quick
 @given(seed=st.integers(0, 10_000), start=st.integers(0, 149), end=st.integers(0, 149), inside=st.booleans())
 @pytest.mark.parametrize("method", Method)
 def test_points_apart(method, seed, start, end, inside):
     water = lake(seed)
     corners = [tuple(xy) for xy in shapely.get_coordinates(water.exterior)]
     launch = water.representative_point().coords[0] if inside else corners[start % len(corners)]
-    asked = request(water, spacings=14, launch=launch, recovery=corners[end % len(corners)], method=method)
-    plan = handle(asked, discard)
+    recovery = corners[end % len(corners)]
+    asked = request(water, spacings=14, launch=launch, recovery=recovery, method=method, time_limit_s=1.0)
+    plan = soon_planned(asked)
     require_sound(plan, asked)
     assert plan.path.length >= 0.95 * asked.length_m
 

@@ -322,16 +322,6 @@ def test_nasty_shapes(name, spacings):
         require_sound(planned(asked), asked)
 
 
-@quick
-@given(seed=st.integers(0, 10_000), start=st.integers(0, 149), end=st.integers(0, 149), inside=st.booleans())
-def test_points_apart(seed, start, end, inside):
-    water = lake(seed)
-    corners = [tuple(xy) for xy in shapely.get_coordinates(water.exterior)]
-    launch = water.representative_point().coords[0] if inside else corners[start % len(corners)]
-    asked = request(water, spacings=12, launch=launch, recovery=corners[end % len(corners)])
-    require_sound(planned(asked), asked)
-
-
 def test_a_tour_leaves_no_large_gap():
     asked = request(lake(5), spacings=20)
     plan = planned(asked)
