@@ -80,7 +80,9 @@ def position(text: str, where: str) -> Position:
     try:
         lat, long = map(float, text.split(","))
     except ValueError as error:
-        raise InvalidMission(f"is {text!r}; expected LAT,LONG in degrees, as 44.6,-73.3", where=where) from error
+        raise InvalidMission(
+            f"is {text!r}; expected LAT,LONG in degrees, such as 44.6,-73.3", where=where
+        ) from error
     return Position(lat=lat, long=long)
 
 
@@ -185,7 +187,7 @@ def replica_counts(texts: Iterable[str]) -> dict[str, int]:
         stage, _, count = text.partition("=")
         # Whether the stage exists, and the count is at least 1, is for `StackSettings` to check.
         if not count.isdecimal():
-            raise InvalidMission(f"is {text!r}; expected STAGE=N, as path=2", where="--replicas")
+            raise InvalidMission(f"is {text!r}; expected STAGE=N, such as path=2", where="--replicas")
         counts[stage] = int(count)
     return counts
 
@@ -216,7 +218,7 @@ def require_compatible(
             f"is {time_limit_s:g} s; expected less than --timeout, {timeout_s:g} s", "--time-limit"
         )
     if local and connect is not None:
-        raise InvalidMission("plans in this process; give one of --local and --connect", where="--local")
+        raise InvalidMission("plans in this process; give either --local or --connect", where="--local")
     if record is not None and (local or connect is not None):
         raise InvalidMission(
             f"is {str(record)!r}; only a plan with neither --local nor --connect makes its own recording",

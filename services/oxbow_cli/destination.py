@@ -52,7 +52,7 @@ class Destination:
             for other in inputs:
                 if other is not None and _same(path, other):
                     raise InvalidMission(
-                        f"is {str(other)!r}, too, which is read or written besides; expected another file",
+                        f"is also {str(other)!r}, which this command reads or writes; expected another file",
                         where=str(path),
                     )
             _require_place(path)

@@ -115,7 +115,7 @@ class Health(Closing):
         for pid, child in silent.items():
             # The other thread may have replaced the process meanwhile: the new one is not to blame.
             if self._is_hung(pid) and child.pid == pid:
-                child.replace(f"has answered nothing for {self._silences[pid].lasted_s:.1f} s")
+                child.replace(f"has not answered for {self._silences[pid].lasted_s:.1f} s")
 
     def _answered(self) -> set[int] | None:
         """IDs of the processes that answer; None if the router cannot be joined."""
@@ -141,7 +141,7 @@ class Health(Closing):
 
     def _trouble(self, child: Child) -> str:
         silence = self._silences.get(child.pid)
-        return child.trouble or (f"has answered nothing for {silence.lasted_s:.1f} s" if silence else "")
+        return child.trouble or (f"has not answered for {silence.lasted_s:.1f} s" if silence else "")
 
     def _note(self, silent: dict[int, Child]) -> None:
         """Add this round to the silences; time in which nothing was pinged does not count."""
@@ -195,7 +195,7 @@ def _kill(stopped: StoppedProcess, leader: Child) -> None:
     if stopped.pid == leader.pid:
         leader.replace("is stopped")
         return
-    _log.warning("%s: process %d of it is stopped; it is killed", leader.name, stopped.pid)
+    _log.warning("%s: its process %d is stopped; killing it", leader.name, stopped.pid)
     with suppress(ProcessLookupError):
         os.kill(stopped.pid, signal.SIGKILL)
 

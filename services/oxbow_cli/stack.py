@@ -152,7 +152,7 @@ def _wait_ready(bus: Bus, started: Iterable[_Service], supervisor: Supervisor, g
     while missing := [each.service for each in started if each.instance not in bus.instances(each.service)]:
         _require_alive(supervisor)
         if missing == ["recorder"] and supervisor.ended():
-            _log.warning("the recorder does not start; planning goes on without recordings")
+            _log.warning("the recorder does not start; planning continues without recordings")
             return
         if time.monotonic() > give_up:
             raise Unavailable(f"no live {', '.join(missing)} after {START_S:g} s", where=bus.endpoint)

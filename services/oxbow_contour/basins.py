@@ -73,8 +73,8 @@ def _require_near(spot: Polygon, water: Polygon, request: ContourRequest, narrow
         way_m = spot.distance(Point(place))
         if way_m > direct_leg_m(request.safety_m, water.distance(Point(place))):
             raise Infeasible(
-                f"is {way_m:.0f} m from the only free water, {spot.area:.2g} m2, and all between is narrower than"
-                f" {narrow}; expected a smaller Safety",
+                f"is {way_m:.0f} m from the only free water, {spot.area:.2g} m2, and everything in between is"
+                f" narrower than {narrow}; expected a smaller Safety",
                 where=f"places[{index}]",
             )
 

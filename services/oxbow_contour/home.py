@@ -147,7 +147,7 @@ class _Barrier:
     def remedy(self) -> str:
         """What would help, other than another place."""
         zones = ", or forbidden zones that leave a way there" if self.zones_m > ROUNDING_M else ""
-        return zones + (", or less for Least_width" if self.narrows_m > ROUNDING_M else "")
+        return zones + (", or a smaller Least_width" if self.narrows_m > ROUNDING_M else "")
 
 
 def _require_no_land_between(water: Polygon, request: ContourRequest, index: int, narrows: BaseGeometry) -> None:
@@ -170,7 +170,7 @@ def _require_no_land_between(water: Polygon, request: ContourRequest, index: int
         barrier = _Barrier.on(behind, request, seams)
         raise InvalidMission(
             f"lies {way.length:.3g} m from water wider than Least_width = {request.least_width_m:g} m, and behind"
-            f" a forbidden zone or other land, {barrier.described}; expected a place by that water, or less for"
+            f" a forbidden zone or other land, {barrier.described}; expected a place by that water, or a smaller"
             " Least_width",
             where=f"places[{index}]",
         )

@@ -171,7 +171,7 @@ class _Run:
             raise _STOPPED.error()
         _log.error("%s: %s", self.job.revision, error)
         if error.is_own_fault and self.planner.registry.store.note_death(self.job.revision) >= MAX_ATTEMPTS:
-            raise Internal(f"{error.message}; so did {MAX_ATTEMPTS} of them, each at this mission", where=STAGE)
+            raise Internal(f"{error.message}; {MAX_ATTEMPTS} of them did, each on this mission", where=STAGE)
         if time.monotonic() > self.until:
             raise DeadlineExceeded(error.message, where=STAGE)
 

@@ -154,7 +154,7 @@ class Registry(Closing):
             self._changed.notify_all()
             latest = self.statuses(mission_id)
         if not latest:
-            raise InvalidMission("is not kept here; expected a mission handed in before", where=mission_id)
+            raise InvalidMission("is not kept here; expected a mission submitted before", where=mission_id)
         return latest[0]
 
     # ----------------------------------------------------------------- planning

@@ -42,7 +42,7 @@ class Reports:
             There is no such mission, or the report is larger than what there is room for; nothing is kept.
         """
         if not self.store.knows(mission_id):
-            raise InvalidMission("is not kept here; expected a mission handed in before", where=mission_id)
+            raise InvalidMission("is not kept here; expected a mission submitted before", where=mission_id)
         self._require_room(mission_id, len(payload))
         with self.database.transaction() as db:
             db.execute("INSERT INTO report VALUES (?, ?, ?)", (mission_id, time.time(), payload))

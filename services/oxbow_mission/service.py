@@ -202,7 +202,7 @@ def _require_kept(found: Sized, asked: MissionKey) -> None:
     """Say that there is nothing: no reply at all would look like no service."""
     if not found:
         raise InvalidMission(
-            "is not kept here; expected a mission, or a revision of it, handed in before", where=str(asked)
+            "is not kept here; expected a mission, or a revision of one, submitted before", where=str(asked)
         )
 
 

@@ -352,10 +352,10 @@ class Store:
 
 def _set_aside_unfit(db: sqlite3.Connection) -> None:
     """Fail missions whose id cannot stand in a key: their outcome could not be published."""
-    cause = InvalidMission("can be no key of the bus", where="id")
+    cause = InvalidMission("cannot be a key on the bus", where="id")
     for (mission_id,) in db.execute("SELECT DISTINCT mission_id FROM revision WHERE NOT announced").fetchall():
         if not _fits(mission_id):
-            _log.error("mission %.200r is set aside: its id can be no key of the bus", mission_id)
+            _log.error("mission %.200r is set aside: its id cannot be a key on the bus", mission_id)
             db.execute(
                 "UPDATE revision SET state = 'failed', error = ?, announced = TRUE"
                 " WHERE mission_id = ? AND NOT announced",

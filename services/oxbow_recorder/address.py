@@ -73,10 +73,10 @@ def address_of(key: str, payload: bytes) -> Address:
     try:
         stamp = msgspec.msgpack.decode(payload, type=_Stamp)
     except (ValueError, RecursionError) as error:  # UnicodeDecodeError is a ValueError, but no DecodeError
-        raise InvalidMission(f"is no layer: {error}", where="layer") from error
+        raise InvalidMission(f"is not a layer: {error}", where="layer") from error
     run = RecordedRun(mission_id=stamp.mission_id, run_id=stamp.request_id or "run")
     own_key = layer_key(stamp.mission_id, stamp.layer.stage, stamp.layer.name)
     # Whoever may publish on one key only must not be able to write into the recording of another mission.
     if key != own_key:
-        raise InvalidMission(f"was put on another key than its own, {own_key}", where="layer")
+        raise InvalidMission(f"was put on a key other than its own, {own_key}", where="layer")
     return Address(run=run, is_last=(stamp.layer.stage, stamp.layer.name) in _END)

@@ -40,7 +40,7 @@ class LiveServer(Closing):
     def revive(self) -> None:
         """Start it again where it has ended, some time after the last start."""
         if self.process.poll() is not None and time.monotonic() - self._started > PAUSE_S:
-            _log.error("the server for viewers ended with status %d; it is started again", self.process.returncode)
+            _log.error("the server for viewers ended with status %d; restarting it", self.process.returncode)
             self.process = self._launch()
 
     def close(self) -> None:

@@ -106,7 +106,7 @@ def _leave(live: rr.RecordingStream) -> None:
         live.disconnect()
     except RuntimeError as error:
         _ABANDONED.append(live)
-        _log.warning("viewers see no end of a recording: %s", error)
+        _log.warning("viewers do not see the end of a recording: %s", error)
 
 
 class Recordings:

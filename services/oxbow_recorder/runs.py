@@ -231,7 +231,7 @@ class Runs(Closing):
 
     def _note_refused(self) -> None:
         if self._refused:
-            _log.warning("%d layers of runs that found no room are not recorded", self._refused)
+            _log.warning("%d layers of runs for which there was no room are not recorded", self._refused)
             self._refused = 0
 
     # ----------------------------------------------------------------- recorded
@@ -260,7 +260,7 @@ class Runs(Closing):
     def _note_late(self, run: RecordedRun) -> None:
         if not self._over[run]:
             self._over[run] = True
-            _log.warning("mission %s: layers of run %s came after its end; dropped", run.mission_id, run.run_id)
+            _log.warning("mission %s: layers of run %s arrived after its end; dropped", run.mission_id, run.run_id)
 
     # ----------------------------------------------------------------- writers
 

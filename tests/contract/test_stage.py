@@ -109,7 +109,9 @@ def test_a_request_whose_deadline_passed_in_the_queue_is_not_started(
 
 def test_no_live_replica_is_reported_by_name(bus: Bus, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bus, "patience_s", 0.0)
-    with pytest.raises(Unavailable, match=r"echo: has no live replica at tcp/127\.0\.0\.1:\d+.*tried no replica"):
+    with pytest.raises(
+        Unavailable, match=r"echo: has no live replica on the bus at tcp/127\.0\.0\.1:\d+.*tried no replica"
+    ):
         bus.call(ECHO, EchoRequest(shape=SQUARE), envelope())
     with pytest.raises(Unavailable, match=r"no live echo, path after 0\.1 s"):
         bus.wait_ready(["echo", "path"], 0.1)

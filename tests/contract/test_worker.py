@@ -106,9 +106,9 @@ def test_whatever_a_handler_raises_is_an_answer_and_costs_no_process(
 @pytest.mark.parametrize(
     ("deed", "kind", "message"),
     [
-        (Deed.ANSWER_FOR_ANOTHER, WorkerLost, "sent Done to request 'another', unasked"),
-        (Deed.FAIL_FOR_ANOTHER, WorkerLost, "sent Failed to request 'another', unasked"),
-        (Deed.DESCRIBE, WorkerLost, "sent Described, unasked"),
+        (Deed.ANSWER_FOR_ANOTHER, WorkerLost, "sent an unexpected Done to request 'another'"),
+        (Deed.FAIL_FOR_ANOTHER, WorkerLost, "sent an unexpected Failed to request 'another'"),
+        (Deed.DESCRIBE, WorkerLost, "sent an unexpected Described"),
         (Deed.BABBLE, WorkerLost, "sent garbage"),
         (Deed.OVERFLOW, WorkerLost, "closed its pipe, or sent garbage"),
         (Deed.DIE, WorkerLost, "ended by SIGKILL"),

@@ -46,7 +46,7 @@ def test_a_launch_that_is_no_position_is_invalid_input(oxbow, site, launch):
     result = oxbow("import", site, "--launch", launch)
     assert result.returncode == 2
     assert result.stdout == ""
-    assert result.stderr == f"error: --launch: is {launch!r}; expected LAT,LONG in degrees, as 44.6,-73.3\n"
+    assert result.stderr == f"error: --launch: is {launch!r}; expected LAT,LONG in degrees, such as 44.6,-73.3\n"
 
 
 def test_swapped_degrees_are_told(oxbow, site):

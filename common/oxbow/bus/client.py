@@ -245,7 +245,9 @@ class _Attempts(Generic[A]):
             if instance is not None:
                 return instance
             if replicas.missing_s(stage) > self.bus.patience_s:
-                raise Unavailable(f"has no live replica at {self.bus.endpoint}, {self._history()}", where=stage)
+                raise Unavailable(
+                    f"has no live replica on the bus at {self.bus.endpoint}, {self._history()}", where=stage
+                )
         raise DeadlineExceeded(f"no answer {self._history()}", where=stage)
 
     def _ask(self, instance: str) -> A:
@@ -269,7 +271,7 @@ class _Attempts(Generic[A]):
         try:
             return self.read(sample.payload.to_bytes())
         except InvalidMission as error:
-            raise _Failed(f"{key} replied what is no answer: {error}", WRONG) from error
+            raise _Failed(f"{key} sent an invalid reply: {error}", WRONG) from error
 
     def _error(self, reply: zenoh.ReplyError, key: str, timeout_s: float) -> OxbowError:
         """The exception to raise for an error reply, if it is one to this request."""

@@ -79,7 +79,9 @@ def require_endpoint(endpoint: str, where: str = "endpoint") -> None:
         It has not.
     """
     if not _ENDPOINT.fullmatch(endpoint):
-        raise InvalidMission(f"is {endpoint!r}; expected PROTOCOL/ADDRESS, as {DEFAULT_ENDPOINT}", where=where)
+        raise InvalidMission(
+            f"is {endpoint!r}; expected PROTOCOL/ADDRESS, such as {DEFAULT_ENDPOINT}", where=where
+        )
 
 
 def _config(settings: dict[str, Any]) -> zenoh.Config:

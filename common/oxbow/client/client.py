@@ -302,7 +302,7 @@ def _readable_statuses(
         try:
             yield read_status(payload, mission_id)
         except InvalidMission as error:
-            _log.warning("%s: passed over: %s", excerpt(key), error)
+            _log.warning("%s: ignored: %s", excerpt(key), error)
 
 
 def _own_status(replies: list[tuple[str, bytes]], mission_id: str) -> MissionStatus:
@@ -311,7 +311,7 @@ def _own_status(replies: list[tuple[str, bytes]], mission_id: str) -> MissionSta
         return read_status(replies[0][1], mission_id)
     except InvalidMission as error:
         raise Internal(
-            f"the mission service answered for another: {error}", where=f"mission {mission_id}"
+            f"the mission service answered about another mission: {error}", where=f"mission {mission_id}"
         ) from error
 
 
@@ -321,11 +321,11 @@ def _own_plan(payload: bytes, submission: Submission) -> Mission:
     try:
         update = kept_plan(payload)
     except InvalidMission as error:
-        raise Internal(f"the mission service answered what is no plan: {error}", where=where) from error
+        raise Internal(f"the mission service's answer is not a plan: {error}", where=where) from error
     if update.mission_id != submission.mission_id or update.revision < 1:
         other = f"{excerpt(update.mission_id)}, revision {update.revision}"
-        raise Internal(f"the mission service answered by the plan of mission {other}", where=where)
+        raise Internal(f"the mission service answered with the plan of mission {other}", where=where)
     # The document leaves out what planning adds: paths, plan, id and revision.
     if Submission(update.mission).document != submission.document:
-        raise Internal("the mission service answered by a plan of other content", where=where)
+        raise Internal("the mission service answered with a plan of different content", where=where)
     return update.mission

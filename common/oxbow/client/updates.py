@@ -83,7 +83,7 @@ def read_status(payload: bytes, mission_id: str | None = None) -> MissionStatus:
     try:
         status = msgspec.json.decode(payload, type=MissionStatus)
     except (msgspec.MsgspecError, ValueError) as error:
-        raise InvalidMission(f"is no MissionStatus: {error}", where="status") from error
+        raise InvalidMission(f"is not a MissionStatus: {error}", where="status") from error
     if mission_id is not None and status.mission_id != mission_id:
         raise InvalidMission(f"is of {excerpt(status.mission_id)}; expected {mission_id!r}", where="status")
     return status
@@ -187,7 +187,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
         try:
             heard = _keyed_plan(key, payload)
         except InvalidMission as error:
-            _log.warning("%s: passed over: %s", excerpt(key), error)
+            _log.warning("%s: ignored: %s", excerpt(key), error)
             return
         if heard.revision <= self._seen.get(heard.mission_id, 0):
             return  # published twice, once before and once after a crash of the service
@@ -199,7 +199,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
             self._due_s = time.monotonic() + LOOK_S
             return
         if heard not in self._pending:
-            _log.warning("%s: passed over: revision %d is not kept with that content", key, heard.revision)
+            _log.warning("%s: ignored: revision %d is not kept with that content", key, heard.revision)
 
     # ----------------------------------------------------------------- catching up
 
@@ -226,7 +226,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
             self._catch_up()
         except OxbowError as error:
             if not self._is_behind:
-                _log.warning("%s: cannot ask what is kept, until later: %s", self._key, error)
+                _log.warning("%s: cannot ask what is kept, will try again: %s", self._key, error)
             self._is_behind, self._due_s = True, time.monotonic() + LOOK_S
 
     def _catch_up(self) -> None:
@@ -247,7 +247,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
             try:
                 update = _keyed_plan(own_key, payload)
             except InvalidMission as error:
-                _log.warning("%s: passed over: %s", excerpt(own_key), error)
+                _log.warning("%s: ignored: %s", excerpt(own_key), error)
             else:
                 found[update.revision] = update
         # Replies arrive in any order; revisions of a mission are seen in theirs.
@@ -262,7 +262,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
             try:
                 yield read_status(payload, asked)
             except InvalidMission as error:
-                _log.warning("%s: passed over: %s", excerpt(own_key), error)
+                _log.warning("%s: ignored: %s", excerpt(own_key), error)
 
     def _ask(self, key: str) -> list[tuple[str, bytes]]:
         try:

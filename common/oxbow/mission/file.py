@@ -317,7 +317,9 @@ def parse_mission(data: bytes) -> Mission:
     names = [name for name in OutlineName if name in document]
     # Neither could be preferred without dropping a contour silently.
     if len(names) > 1:
-        raise InvalidMission("is given beside BoundingBox, its newer name; expected one of them", where="InBox")
+        raise InvalidMission(
+            "is given in addition to BoundingBox, its newer name; expected only one of them", where="InBox"
+        )
     for name, (kind, is_list) in _PARTS.items():
         if name in document:
             document[name] = gathered_part(bytes(document[name]), kind, name, is_list=is_list)

@@ -79,7 +79,7 @@ class PriorFeature(msgspec.Struct, frozen=True, kw_only=True):
             is_sound = is_valid(self.geometry)
         except TooManyPairs as error:
             raise InvalidMission(
-                f"is a {kind} with so many long edges beside one another that over {MOST_PAIRS} pairs of them"
+                f"is a {kind} with so many long edges side by side that over {MOST_PAIRS} pairs of them"
                 " would have to be compared; expected shorter edges or fewer points",
                 where="geometry",
             ) from error

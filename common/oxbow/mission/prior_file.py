@@ -108,7 +108,7 @@ def _cells(name: str, words: list[str], rows: int, columns: int) -> FloatArray:
     try:
         values = np.array(words, dtype=np.float64)
     except ValueError as error:
-        raise InvalidMission(f"is no grid of numbers: {error}", where=name) from error
+        raise InvalidMission(f"is not a grid of numbers: {error}", where=name) from error
     if len(values) != rows * columns:
         raise InvalidMission(f"has {len(values)} values; expected nrows x ncols, {rows} x {columns}", where=name)
     return values.reshape(rows, columns)
@@ -141,7 +141,7 @@ def _raster(name: str, dataset: Any) -> Raster:
         raise InvalidMission(f"has {system}; expected WGS84 degrees, EPSG:{WGS84_EPSG}", where=name)
     to_degrees = dataset.transform
     if to_degrees.b or to_degrees.d:
-        raise InvalidMission("is turned; expected rows from west to east", where=name)
+        raise InvalidMission("is rotated; expected rows from west to east", where=name)
     weights = dataset.read(1, masked=True).astype(np.float64).filled(np.nan)
     return Raster(
         name, weights, west=to_degrees.c, north=to_degrees.f, step_long=to_degrees.a, step_lat=to_degrees.e

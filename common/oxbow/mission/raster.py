@@ -52,7 +52,7 @@ class Raster:
         if len(wrong):
             row, column = wrong[0]
             raise InvalidMission(
-                f"is {self.weights[row, column]:g}; expected a finite weight >= 0, or the value of no data",
+                f"is {self.weights[row, column]:g}; expected a finite weight >= 0, or the no-data value",
                 where=f"{self.name}: row {row}, column {column}",
             )
         if np.isnan(self.weights).all():

@@ -1,4 +1,4 @@
-"""Warnings about unknown fields of a Mission File that look like a known one: most likely a slip of the pen."""
+"""Warnings about unknown fields of a Mission File that look like a known one: most likely misspelt."""
 
 from __future__ import annotations
 
@@ -41,4 +41,4 @@ def _like(unknown: Iterable[str], known: Iterable[str], prefix: str) -> Iterator
     for field in unknown:
         close = difflib.get_close_matches(field.lower(), names, n=1, cutoff=ALIKE)
         if close:
-            yield f"{prefix}{field} is no known field and is kept unchanged; is {names[close[0]]} meant?"
+            yield f"{prefix}{field} is not a known field and is kept unchanged; did you mean {names[close[0]]}?"

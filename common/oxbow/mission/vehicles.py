@@ -79,7 +79,7 @@ def require_distinct(vehicles: Sequence[GivenVehicle]) -> None:
         # Plans, recordings and errors tell vehicles apart by their names alone.
         if (first := seen.setdefault(vehicle.name, index)) < index:
             raise InvalidMission(
-                f"is {vehicle.name!r}, as that of Vehicles[{first}]; expected a name of its own", f"{where}.Name"
+                f"is {vehicle.name!r}, the same as Vehicles[{first}]; expected a different name", f"{where}.Name"
             )
         for field in ("speed_mps", "length_m"):
             value = getattr(vehicle, field)

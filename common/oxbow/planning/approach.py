@@ -125,7 +125,9 @@ class Approach:
             line = candidate.line
             if line.is_simple and all(map(self._keeps_to_water, candidate.legs)):
                 return line
-        raise Infeasible("is reached only by water too narrow to come back beside the way out", "LaunchPoint")
+        raise Infeasible(
+            "can be reached only through water too narrow for a way back beside the way out", "LaunchPoint"
+        )
 
     def _candidates(self, path: FloatArray) -> Iterator[_Candidate]:
         """Legs on either side, with the path either way round, ever nearer to each other."""
@@ -299,7 +301,7 @@ class Harbour:
             if LineString(line).intersection(share).length <= ROUNDING_M:
                 return last
         if last is None:
-            raise Infeasible("lies in water from which no way leads to the vehicle's share", "LaunchPoint")
+            raise Infeasible("lies in water from which no route leads to the vehicle's share", "LaunchPoint")
         return last
 
 

@@ -70,7 +70,7 @@ class CheckedCall:
         reply = self.call(endpoint, request, part=part)
         for fault in CHECKS[endpoint.stage](request, reply):
             raise Internal(
-                f"replied what does not belong to the request: {fault}; nothing is planned on it", endpoint.stage
+                f"sent a reply that does not match the request: {fault}; nothing is planned on it", endpoint.stage
             )
         return reply
 

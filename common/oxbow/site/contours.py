@@ -141,7 +141,7 @@ def _comparable(name: str) -> Iterator[None]:
         yield
     except TooManyPairs as error:
         raise InvalidMission(
-            f"has so many long edges beside one another that over {MOST_PAIRS} pairs of them would have to be"
+            f"has so many long edges side by side that over {MOST_PAIRS} pairs of them would have to be"
             " compared; expected a contour of shorter edges or fewer points",
             where=name,
         ) from error
@@ -246,7 +246,7 @@ class _Zones:
         parts = (polygon,) if is_valid else _enclosed(polygon)
         warnings = () if is_valid else (f"{name} meets itself: all that it encloses is {self.what}",)
         if not shapely.intersects(outline, parts).any():
-            return Zone(warnings=(*warnings, f"{name} lies outside {self.outline_name}: it changes nothing"))
+            return Zone(warnings=(*warnings, f"{name} lies outside {self.outline_name}: it has no effect"))
         return Zone(parts, warnings)
 
     def _require_few_crossings(self, polygons: Geometries, outline: Polygon) -> None:
@@ -263,13 +263,13 @@ class _Zones:
             crossings += int((one != other).sum())
             if own.sum() > MOST_OWN_CROSSINGS:
                 raise InvalidMission(
-                    f"meets itself more often than {MOST_OWN_CROSSINGS} times, with the other zones; expected a"
+                    f"meets itself, with the other zones, more than {MOST_OWN_CROSSINGS} times; expected a"
                     " contour that goes round once",
                     where=self.contours[int(np.argmax(own))].name,
                 )
             if crossings > MOST_CROSSINGS:
                 raise InvalidMission(
-                    f"cross one another and {self.outline_name} more often than {MOST_CROSSINGS} times; expected"
+                    f"cross one another and {self.outline_name} more than {MOST_CROSSINGS} times; expected"
                     " zones that overlap less",
                     where=self.field,
                 )

@@ -289,7 +289,7 @@ def _joined(areas: Sequence[_Area]) -> list[_Area]:
 def _chosen(areas: Sequence[_Area], part: int | None, passed_over: Counter[str]) -> _Area:
     if not areas:
         seen = f", but {_counted(passed_over)}" if passed_over else ""
-        raise InvalidMission(f"holds no polygon{seen}", where=DOCUMENT)
+        raise InvalidMission(f"contains no polygon{seen}", where=DOCUMENT)
     if part is None and len(areas) == 1:
         return areas[0]
     if part is None or not 0 <= part < len(areas):

@@ -93,7 +93,7 @@ def hot_spots(
     # Overlaps would be treated, and counted, twice.
     if overlap := first_overlap(spots):
         raise InvalidMission(
-            f"overlaps {overlap.one.name} by {overlap.area_m2:.0f} m2; expected hot spots apart from one another,"
+            f"overlaps {overlap.one.name} by {overlap.area_m2:.0f} m2; expected separate hot spots,"
             " and none inside another",
             where=f"PriorModel.{overlap.other.name}",
         )

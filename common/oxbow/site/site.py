@@ -162,7 +162,7 @@ def _prior_warnings(mission: Mission, areas: tuple[WeightedArea, ...]) -> tuple[
     features = () if mission.prior_model is None else mission.prior_model.features
     if areas or all(feature.weight is None for feature in features):
         return ()
-    return (f"PriorModel has no weight other than 1 inside {mission.outline_name}: its weights change nothing",)
+    return (f"PriorModel has no weight other than 1 inside {mission.outline_name}: its weights have no effect",)
 
 
 def _hot_spots(mission: Mission, frame: Frame, outline: Polygon, water: BaseGeometry) -> HotSpots:

@@ -105,7 +105,7 @@ def require_same(request_id: str, known: bytes, request: bytes) -> None:
     """
     if digest(request) != known:
         raise InvalidMission(
-            f"is {request_id!r}, the id of another request; expected one for each", where="request_id"
+            f"is {request_id!r}, the id of another request; expected a unique id", where="request_id"
         )
 
 

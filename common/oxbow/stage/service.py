@@ -130,7 +130,9 @@ class Stage:
             if not self._requests.offer(exchange):
                 self._busy += 1
                 waiting = len(self._requests)
-                raise Busy(f"takes no more requests now; {waiting} wait", where=self.described.instance_key)
+                raise Busy(
+                    f"accepts no more requests now; {waiting} are waiting", where=self.described.instance_key
+                )
             # Still under the lock: its worker thread may have the request already, and waits to settle it.
             self._open[envelope.request_id] = exchange
             return None

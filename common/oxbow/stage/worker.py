@@ -187,7 +187,7 @@ class Worker:
     def _misconduct(self, message: FromWorker) -> WorkerLost:
         kind = type(message).__name__
         about = "" if isinstance(message, Described) else f" to request {message.request_id!r}"
-        return WorkerLost(f"worker process {self.pid} sent {kind}{about}, unasked", where=self.handler)
+        return WorkerLost(f"worker process {self.pid} sent an unexpected {kind}{about}", where=self.handler)
 
     def _loss(self, watch: Watch) -> OxbowError:
         """What to say of a process whose pipe is closed."""

@@ -54,7 +54,7 @@ def _array(value: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
             array = np.frombuffer(data, dtype=_FLOAT).reshape(shape)
         case _:
             raise ValueError(
-                f"is no array; expected ['{_FLOAT}', shape, bytes] with as many bytes as the shape has"
+                f"is not an array; expected ['{_FLOAT}', shape, bytes] with as many bytes as the shape has"
             )
     if not np.isfinite(array).all():
         raise ValueError("has elements that are not finite")
@@ -110,4 +110,4 @@ def decode(data: bytes, kind: type[T]) -> T:
         raise InvalidMission(f"{problem[:1].lower()}{problem[1:]}", where=f"{kind.__name__}{path}") from error
     # What else malformed bytes raise: text that is not UTF-8, nesting too deep, lengths beyond 64 bits.
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, OverflowError) as error:
-        raise InvalidMission(f"is no MessagePack of one: {error}", where=kind.__name__) from error
+        raise InvalidMission(f"is not a valid MessagePack message: {error}", where=kind.__name__) from error

@@ -85,7 +85,7 @@ def from_wkb(data: bytes, kind: type[BaseGeometry]) -> BaseGeometry:
     try:
         geometry: BaseGeometry = shapely.from_wkb(data)
     except shapely.errors.ShapelyError as error:
-        raise ValueError(f"is no geometry: {error}") from error
+        raise ValueError(f"is not a geometry: {error}") from error
     if kind is not BaseGeometry and geometry.is_empty:
         raise ValueError("is empty")
     return geometry
@@ -94,7 +94,7 @@ def from_wkb(data: bytes, kind: type[BaseGeometry]) -> BaseGeometry:
 def _end(data: bytes, start: int, accepted: frozenset[int]) -> int:
     """Where the geometry ends that begins at `start` and should be of one of the `accepted` types."""
     if data[start] > 1:
-        raise ValueError(f"is no WKB: byte order {data[start]}; expected 0 or 1")
+        raise ValueError(f"is not WKB: byte order {data[start]}; expected 0 or 1")
     order = "<" if data[start] == 1 else ">"
     (number,) = struct.unpack_from(f"{order}I", data, start + 1)
     if number not in accepted:

@@ -212,7 +212,7 @@ def rebalanced(partition: Partition, capacities: FloatArray, allowed: Mask) -> P
 def _checked(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None) -> FloatArray:
     capacities = np.ones(len(starts)) if capacities is None else np.asarray(capacities, dtype=float)
     if not 0 < len(starts) <= len(mesh):
-        raise InvalidMission(f"are {len(starts)}; expected 1 to {len(mesh)}, one for a triangle", where="Vehicles")
+        raise InvalidMission(f"are {len(starts)}; expected 1 to {len(mesh)}, one per triangle", where="Vehicles")
     if len(capacities) != len(starts):
         raise InvalidMission(f"are {len(starts)}, with {len(capacities)} capacities", where="Vehicles")
     for vehicle, capacity in enumerate(capacities.tolist()):

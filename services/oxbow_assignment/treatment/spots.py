@@ -40,7 +40,7 @@ def require_treatable(spots: Sequence[HotSpot]) -> None:
     if overlap := first_overlap(spots):
         raise InvalidMission(
             f"hot spots {overlap.one.name!r} and {overlap.other.name!r} overlap in {overlap.area_m2:.4g} m2;"
-            " expected areas apart",
+            " expected separate areas",
             where="hot_spots",
         )
 

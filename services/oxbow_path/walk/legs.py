@@ -117,7 +117,9 @@ def joined(
         opening_m, detail_m = opening_m / 2, detail_m * OTHER_DETAIL
     for leg, where in ((launch, "LaunchPoint"), (recovery, "RecoveryPoint")):
         if leg.winds:
-            raise Infeasible("is reached only by water too narrow to come back beside the way out", where)
+            raise Infeasible(
+                "can be reached only through water too narrow for a way back beside the way out", where
+            )
     raise Internal(f"the legs from {launch.place} and to {recovery.place} do not fit the ring", "legs")
 
 

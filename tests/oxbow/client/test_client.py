@@ -171,8 +171,8 @@ PLAN = json.dumps(
 @pytest.mark.parametrize(
     ("answer", "message"),
     [
-        (lambda _mission: b"{", "what is no plan"),
-        (lambda mission: mission, "what is no plan"),
+        (lambda _mission: b"{", "is not a plan"),
+        (lambda mission: mission, "is not a plan"),
         (lambda mission: planned(mission, mission_id="another"), "the plan of mission 'another'"),
         (lambda mission: planned(mission, revision=0), "revision 0"),
         (lambda mission: planned(mission_file(Safety=7), mission_id=own_id(mission)), "other content"),

@@ -103,7 +103,7 @@ def test_a_danger_that_is_no_finite_number_is_refused(number):
 def test_a_zone_outside_the_water_is_a_warning():
     found = site(zone(contour=square(47.0, 1.0)), zone(0.2))
     assert [each.probability for each in found.danger_zones] == [0.2]
-    assert "DangerZones[0] lies outside BoundingBox: it changes nothing" in found.warnings
+    assert "DangerZones[0] lies outside BoundingBox: it has no effect" in found.warnings
 
 
 def test_all_that_a_zone_encloses_is_dangerous():

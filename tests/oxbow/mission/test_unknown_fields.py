@@ -21,14 +21,14 @@ def warnings(**fields):
 @pytest.mark.parametrize(
     ("fields", "told"),
     [
-        ({"Saftey": 10.0}, "Saftey is no known field and is kept unchanged; is Safety meant?"),
-        ({"safety": 10.0}, "is Safety meant?"),
-        ({"Forbidden_Zones": []}, "is ForbiddenZones meant?"),
-        ({"Bloom": BLOOM | {"Sensors": "no3"}}, "Bloom.Sensors is no known field"),
-        ({"Vehicles": [{"Name": "a", "Role": "master", "length": 9.0}]}, "Vehicles[0].length is no known field"),
+        ({"Saftey": 10.0}, "Saftey is not a known field and is kept unchanged; did you mean Safety?"),
+        ({"safety": 10.0}, "did you mean Safety?"),
+        ({"Forbidden_Zones": []}, "did you mean ForbiddenZones?"),
+        ({"Bloom": BLOOM | {"Sensors": "no3"}}, "Bloom.Sensors is not a known field"),
+        ({"Vehicles": [{"Name": "a", "Role": "master", "length": 9.0}]}, "Vehicles[0].length is not a known field"),
         (
             {"DangerZones": [{"Contour": POND, "Danger": 0.1, "per": "metre"}]},
-            "DangerZones[0].per is no known field and is kept unchanged; is Per meant?",
+            "DangerZones[0].per is not a known field and is kept unchanged; did you mean Per?",
         ),
     ],
 )

@@ -80,7 +80,7 @@ def test_polygons_come_back_as_they_were(order: int, flavor: str) -> None:
         (shapely.to_wkb(Polygon()), "is empty"),
         (shapely.to_wkb(box(0.0, 0.0, 1e300, 1.0)), r"not finite, or beyond 2\.1e\+07 m"),
         (shapely.to_wkb(SQUARE)[:-8] + struct.pack("<d", math.nan), "not finite"),
-        (shapely.to_wkb(SQUARE)[:-8] + struct.pack("<d", 1.0), "is no geometry: .*closed"),
+        (shapely.to_wkb(SQUARE)[:-8] + struct.pack("<d", 1.0), "is not a geometry: .*closed"),
         (bytes(2**24 + 1), "has 16777217 bytes; expected at most 16777216"),
         ("POINT (0 0)", "is a str; expected WKB"),
         (msgspec.msgpack.Ext(1, b""), "is a Ext; expected WKB"),
@@ -128,7 +128,7 @@ def test_layers_may_hold_any_simple_geometry_and_no_collection() -> None:
 )
 def test_what_is_no_array_of_floats_is_refused(floor: Any) -> None:
     message = {"floor": floor, "ceiling": ["<f8", [1, 2], bytes(16)], "start": 0, "end": 0}
-    with pytest.raises(InvalidMission, match=r"Cell\.floor: is no array"):
+    with pytest.raises(InvalidMission, match=r"Cell\.floor: is not an array"):
         codec.decode(msgspec.msgpack.encode(message), Cell)
 
 

@@ -129,7 +129,7 @@ def _way_afloat(area: BaseGeometry, routes: Routes, berth: Place) -> FloatArray:
         return np.asarray(shapely.get_coordinates(straight))
     route = routes.to_area(np.array(berth), area, routes.goals_in(area))
     if route is None:
-        raise Infeasible("lies in water from which no way leads to the free space", "LaunchPoint")
+        raise Infeasible("lies in water from which no route leads to the free space", "LaunchPoint")
     # A route to a goal may cross the area before: only the stretch up to the first contact counts.
     outside = shapely.get_parts(route.difference(area))
     return np.asarray(shapely.get_coordinates(outside[np.argmin(shapely.distance(outside, point))]))

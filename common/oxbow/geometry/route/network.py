@@ -155,7 +155,7 @@ class NetworkRouter:
             if start == goal:
                 return points[[start, goal]]
             if not np.isfinite(costs[start, goal]):
-                raise Infeasible(f"no way leads from points[{start}] to points[{goal}]", where=f"points[{goal}]")
+                raise Infeasible(f"no route leads from points[{start}] to points[{goal}]", where=f"points[{goal}]")
             there = not is_back[start, goal]
             return self._line(found, start, goal) if there else self._line(found, goal, start)[::-1]
 
@@ -280,4 +280,6 @@ def _require_way(cost: float, ends: FloatArray) -> None:
     """
     if not math.isfinite(cost):
         start, goal = (f"({x:.6g}, {y:.6g})" for x, y in ends)
-        raise Infeasible(f"at {goal} is in other water than the start at {start}: no way leads there", "goal")
+        raise Infeasible(
+            f"at {goal} is not in the same water as the start at {start}: no route leads there", "goal"
+        )

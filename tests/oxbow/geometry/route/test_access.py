@@ -70,7 +70,7 @@ def test_round_the_corner_of_a_creek(area):
 
 def test_water_that_leads_elsewhere_is_refused():
     pond = box(200, 0, 250, 50)
-    with pytest.raises(Infeasible, match="no way leads"):
+    with pytest.raises(Infeasible, match="no route leads"):
         way_to(AREA, Routes(MultiPolygon([WATER, pond])), (225, 25))
 
 

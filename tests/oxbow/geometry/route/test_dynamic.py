@@ -111,7 +111,7 @@ def test_a_boom_across_the_water_parts_it():
     router = DynamicRouter(box(0, 0, 100, 100))
     router.put("boom", box(45, -5, 55, 105))
     assert np.isinf(router.distances([(10, 10), (90, 90)])[0, 1])
-    with pytest.raises(Infeasible, match="no way leads there"):
+    with pytest.raises(Infeasible, match="no route leads there"):
         router.route((10, 10), (90, 90))
     with pytest.raises(Infeasible, match=r"start: at \(50, 50\) lies outside the water, 5 m"):
         router.route((50, 50), (90, 90))

@@ -262,7 +262,7 @@ def test_waters_apart_are_infinitely_far(method):
     distances = router.distances([(1, 1), (9, 9), (25, 5)])
     assert np.isinf(distances[:2, 2]).all()
     assert distances[0, 1] == pytest.approx(8 * np.sqrt(2))
-    with pytest.raises(Infeasible, match=r"goal: .*no way leads there"):
+    with pytest.raises(Infeasible, match=r"goal: .*no route leads there"):
         router.route((1, 1), (25, 5))
 
 
@@ -271,7 +271,7 @@ def test_a_table_has_no_line_over_land(method):
     waters = MultiPolygon([box(0, 0, 100, 100), box(200, 0, 300, 100)])
     table = make_router(method, waters).table([(50.0, 50.0), (250.0, 50.0), (60.0, 60.0)])
     for start, goal in ((0, 1), (1, 0)):
-        with pytest.raises(Infeasible, match=rf"points\[{goal}\]: no way leads from points\[{start}\]"):
+        with pytest.raises(Infeasible, match=rf"points\[{goal}\]: no route leads from points\[{start}\]"):
             table.polyline(start, goal)
     assert np.array_equal(table.polyline(0, 2)[[0, -1]], [(50.0, 50.0), (60.0, 60.0)])
 
