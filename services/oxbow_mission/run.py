@@ -116,7 +116,7 @@ class Run:
                 return codec.decode(answer.payload, endpoint.reply)
             except InvalidMission as error:
                 wrong = error
-        raise Internal(f"{MOST_WRONG} times sent an invalid reply: {wrong}", where=endpoint.stage)
+        raise Internal(f"sent an invalid reply {MOST_WRONG} times: {wrong}", where=endpoint.stage)
 
     def _show_outcome(self, name: str, text: str) -> None:
         # Not droppable: the recorder finishes the recording when this layer comes.

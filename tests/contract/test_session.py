@@ -169,7 +169,9 @@ def test_connecting_to_nothing_names_the_endpoint() -> None:
 
 
 def test_an_endpoint_without_a_protocol_is_refused() -> None:
-    with pytest.raises(InvalidMission, match=r"endpoint: is 'localhost:7447'; expected PROTOCOL/ADDRESS, as tcp/"):
+    with pytest.raises(
+        InvalidMission, match=r"endpoint: is 'localhost:7447'; expected PROTOCOL/ADDRESS, such as tcp/"
+    ):
         Bus.connect("localhost:7447")
 
 

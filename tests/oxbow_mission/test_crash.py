@@ -123,7 +123,7 @@ def test_a_poisoned_mission_fails_alone_though_the_service_is_killed(
     failed = [status for status in statuses if status.state is MissionState.FAILED]
     assert [status.mission_id for status in failed] == ["lake-3"]
     assert failed[0].error is not None
-    assert "no answer" in failed[0].error.message
+    assert "invalid reply" in failed[0].error.message
 
 
 def test_killed_at_random_moments(

@@ -72,7 +72,7 @@ def accept(registry: Registry, mission_id: str, document: str, deadline_s: float
 @pytest.mark.parametrize(
     ("document", "code", "message"),
     [
-        ("crashes", ErrorCode.INTERNAL, f"SIGSEGV; so did {MAX_ATTEMPTS} of them"),
+        ("crashes", ErrorCode.INTERNAL, f"SIGSEGV; {MAX_ATTEMPTS} of them did"),
         ("needs memory", ErrorCode.INFEASIBLE, "needs more than the 512 MB"),
         ("hangs", ErrorCode.TIMEOUT, "stopped after"),
         ("raises", ErrorCode.INTERNAL, "out of the blue"),

@@ -45,9 +45,9 @@ def delete(bus: Bus, key: str) -> None:
 
 FALSE: dict[str, tuple[Callable[[Bus, str, bytes], None], str]] = {
     "malformed": (lambda bus, key, _plan: bus.publish(key, b"{"), "not JSON"),
-    "no text": (lambda bus, key, _plan: bus.publish(key, b"\xff\xfe"), "passed over"),
+    "no text": (lambda bus, key, _plan: bus.publish(key, b"\xff\xfe"), "ignored"),
     "without a plan": (lambda bus, key, _plan: bus.publish(key, mission_file()), "has no mission_id"),
-    "deleted": (lambda bus, key, _plan: delete(bus, key), "passed over"),
+    "deleted": (lambda bus, key, _plan: delete(bus, key), "ignored"),
     "of another mission": (
         lambda bus, key, plan: bus.publish(key, forged(plan, mission_id="another")),
         "is 'another'; expected that of its key",
@@ -175,7 +175,7 @@ PLAN = json.dumps(
         (lambda mission: mission, "is not a plan"),
         (lambda mission: planned(mission, mission_id="another"), "the plan of mission 'another'"),
         (lambda mission: planned(mission, revision=0), "revision 0"),
-        (lambda mission: planned(mission_file(Safety=7), mission_id=own_id(mission)), "other content"),
+        (lambda mission: planned(mission_file(Safety=7), mission_id=own_id(mission)), "different content"),
     ],
 )
 def test_a_plan_that_is_not_of_the_mission_is_never_returned(
@@ -206,7 +206,7 @@ def test_a_status_of_another_mission_is_never_returned(impostor: tuple[str, dict
                 lambda: client.cancel("lake"),
             ]
             for call in calls:
-                with pytest.raises(Internal, match="answered for another"):
+                with pytest.raises(Internal, match="answered about another"):
                     call()
 
 

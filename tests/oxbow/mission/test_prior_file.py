@@ -198,7 +198,7 @@ class TestGeoTiff:
             ({"crs": "EPSG:32631"}, "EPSG:32631"),
             ({"crs": None}, "no coordinate system"),
             ({"bands": 2}, "2 bands"),
-            ({"shear": 0.001}, "turned"),
+            ({"shear": 0.001}, "rotated"),
             ({"weights": [[1, -5]]}, "row 0, column 1"),
             ({"weights": [[-1, -1]]}, "no cell"),
             ({"weights": np.ones((501, 500))}, "250000"),

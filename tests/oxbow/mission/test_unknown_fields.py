@@ -25,7 +25,10 @@ def warnings(**fields):
         ({"safety": 10.0}, "did you mean Safety?"),
         ({"Forbidden_Zones": []}, "did you mean ForbiddenZones?"),
         ({"Bloom": BLOOM | {"Sensors": "no3"}}, "Bloom.Sensors is not a known field"),
-        ({"Vehicles": [{"Name": "a", "Role": "master", "length": 9.0}]}, "Vehicles[0].length is not a known field"),
+        (
+            {"Vehicles": [{"Name": "a", "Role": "master", "length": 9.0}]},
+            "Vehicles[0].length is not a known field",
+        ),
         (
             {"DangerZones": [{"Contour": POND, "Danger": 0.1, "per": "metre"}]},
             "DangerZones[0].per is not a known field and is kept unchanged; did you mean Per?",

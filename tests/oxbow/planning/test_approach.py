@@ -148,5 +148,5 @@ def test_water_without_a_way_to_the_share_is_refused():
         tolerance_m=1.0,
         compression=1.0,
     )
-    with pytest.raises(Infeasible, match="no way"):
+    with pytest.raises(Infeasible, match="no route"):
         Harbour(space, SPACING_M).approach(box(200, 0, 300, 100), vehicle((50.0, 50.0)))
