@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import Counter
 
 from hypothesis import given
@@ -40,6 +41,17 @@ def test_a_replica_to_avoid_is_chosen_only_where_no_other_lives() -> None:
     assert [known.acquire("path", {"a"}, 0.0) for _ in range(3)] == ["b", "b", None]
     known.update("path", "b", alive=False)
     assert known.acquire("path", {"a"}, 0.0) == "a"
+
+
+def test_a_stage_is_missing_since_its_last_replica_went_or_since_the_start() -> None:
+    started = time.monotonic()
+    known = replicas("a")
+    assert known.missing_s("path") == 0.0
+    assert 0.0 <= known.missing_s("contour") <= time.monotonic() - started
+    gone = time.monotonic()
+    known.update("path", "a", alive=False)
+    assert known.missing_s("path") <= time.monotonic() - gone
+    assert known.missing_s("contour") > known.missing_s("path")
 
 
 def test_a_caller_waits_for_a_replica_to_come_or_to_be_free() -> None:

@@ -1,13 +1,10 @@
-"""Lattices and spacings: by the area of the water, not by the box round it."""
-
-import math
+"""Lattices: by the area of the water, not by the box round it."""
 
 import numpy as np
 import pytest
 import shapely
 from shapely import Polygon, affinity, box
 
-from oxbow.contracts.budget import nominal_spacing_m
 from oxbow.geometry.lattice import lattice_within
 
 
@@ -31,10 +28,3 @@ def test_a_diagonal_canal_costs_its_own_area():
     canal = affinity.rotate(box(0, 0, 50_000, 0.1), 45.0)
     places = lattice_within(canal, canal.exterior.coords[0], 0.5, 0.5)
     assert 0.5 * canal.area <= 0.25 * len(places) <= 2.0 * canal.area
-
-
-def test_a_short_length_is_divided_into_spacings():
-    assert nominal_spacing_m(1e6, 20_000.0) == pytest.approx(50.0)
-    assert nominal_spacing_m(12e6, 1_000.0) == pytest.approx(125.0)
-    assert nominal_spacing_m(1e6, 20_000.0, 80.0) == pytest.approx(80.0)
-    assert math.isclose(nominal_spacing_m(1e6, 1e9), 1e-3)

@@ -44,6 +44,7 @@ DOCUMENT = {
         (b'{"name": "x", "part": {"number": "1"}, "part": 5}', r"part\.number: is given twice; expected"),
         (b'{"name": 1, "\xff": 1, "part": {}}', "name: is 1; expected|document: is not JSON"),
         (b'{"name": "\xff", "part": {}}', "document: is not JSON: a string is not UTF-8"),
+        (b'{\n"name": "x",\n"part": }\n', r"on line 3, in '.*\"part\": }'"),
     ],
 )
 def test_what_is_wrong_is_named(data: bytes, message: str) -> None:

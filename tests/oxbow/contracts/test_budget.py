@@ -1,12 +1,13 @@
-"""Refusals of lengths that do not suffice."""
+"""Spacings by length, and refusals of lengths that do not suffice."""
 
+import math
 import re
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from oxbow.contracts.budget import LENGTH_RESERVE, too_short
+from oxbow.contracts.budget import LENGTH_RESERVE, nominal_spacing_m, too_short
 
 
 @given(st.floats(0.01, 1e7), st.sampled_from([LENGTH_RESERVE, 0.01]))
@@ -30,3 +31,10 @@ def test_a_refusal_names_the_field_what_it_is_and_what_it_is_for():
 @pytest.mark.parametrize("length_m", [1e-3, 123456.789])
 def test_the_length_that_was_given_is_given_back(length_m):
     assert f"is {length_m} m; " in too_short(length_m, 1e9).message
+
+
+def test_a_short_length_is_divided_into_spacings():
+    assert nominal_spacing_m(1e6, 20_000.0) == pytest.approx(50.0)
+    assert nominal_spacing_m(12e6, 1_000.0) == pytest.approx(125.0)
+    assert nominal_spacing_m(1e6, 20_000.0, 80.0) == pytest.approx(80.0)
+    assert math.isclose(nominal_spacing_m(1e6, 1e9), 1e-3)
