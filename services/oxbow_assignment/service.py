@@ -27,6 +27,11 @@ def handle(request: AssignRequest, show: Show) -> Assignment:
     show
         Takes the layers of the recording.
 
+    Returns
+    -------
+    Assignment
+        Shares only where they are asked for, sorties only where there are hot spots to be treated.
+
     Raises
     ------
     InvalidMission

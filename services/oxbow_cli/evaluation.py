@@ -153,6 +153,7 @@ def _paths(mission: Mission, site: Site) -> Iterator[_Path]:
             raise InvalidMission(
                 f"has {len(waypoints)} waypoints; expected a path: `oxbow plan` makes one", where=where
             )
+        # Both lengths: in the plane for what is judged there, along the earth for what a vehicle really travels.
         degrees = lonlat(waypoints)
         yield _Path(member, LineString(site.frame.to_planar(degrees)), geodesic_length_m(degrees))
 

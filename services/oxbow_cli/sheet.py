@@ -270,6 +270,7 @@ def noted(axes: Axes) -> BaseGeometry:
 def draw_scale_and_north(axes: Axes) -> None:
     """Draw a scale bar of a round length below the map, and a north arrow above it."""
     (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
+    # The bar, a fifth of the map's width at most, in four parts of alternating colour.
     bar_m = _round_down(0.2 * (east - west))
     x, y = west + 0.04 * (east - west), south - 0.35 * _FOOTER_IN * (north - south) / _map_height_in(axes)
     height_m = 0.004 * (east - west)
@@ -286,6 +287,7 @@ def draw_scale_and_north(axes: Axes) -> None:
             )
         )
     axes.text(x + bar_m + 0.01 * (east - west), y, distance_text(bar_m), fontsize=8, color=INK, va="baseline")
+    # The arrow keeps its size in inches, however large the map is.
     height_in = axes.figure.get_window_extent().height / axes.figure.dpi
     axes.annotate(
         "N",

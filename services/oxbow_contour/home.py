@@ -36,6 +36,11 @@ def home_water(waters: Sequence[Polygon], request: ContourRequest, narrows: Base
     narrows
         The rest of the water, which is too narrow.
 
+    Returns
+    -------
+    Polygon
+        One of `waters`, the same object.
+
     Raises
     ------
     InvalidMission

@@ -65,6 +65,7 @@ class Checks(Closing):
 
     def __init__(self, memory_mb: int, handler: str = "oxbow_mission.check:check") -> None:
         self._slow = _Lane(Helpers(handler, memory_mb), SLOW_S, _refuse_late)
+        # Most requests are small and take milliseconds: none of them waits behind one that takes long.
         self._quick = _Lane(Helpers(handler, memory_mb), QUICK_S, self._slow.put)
         self._quick.prepare()
 

@@ -136,6 +136,8 @@ class Database(Closing):
 
     def _hold(self) -> None:
         try:
+            # The kernel lets go of the lock when its holder dies, however it dies: a file that only names one
+            # would go stale.
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             holder = self._noted() or "unknown"
@@ -165,6 +167,8 @@ class Database(Closing):
     def _set_up(self, schema: Schema) -> None:
         db = self._db
         db.row_factory = sqlite3.Row
+        # A file of 0 bytes has version 0 and no tables; any other that has no version of ours is not to be
+        # touched.
         version = int(db.execute("PRAGMA user_version").fetchone()[0])
         known = {0, schema.version, *schema.upgrades}
         tables = [name for (name,) in db.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")]
@@ -174,9 +178,11 @@ class Database(Closing):
                 f" {', '.join(map(str, sorted(known - {0})))}",
                 where=str(self.path),
             )
+        # A quick check reads every page; it leaves out only the comparison of indexes with their tables.
         damage = str(db.execute("PRAGMA quick_check(1)").fetchone()[0])
         if damage != "ok":
             raise Unavailable(f"is damaged ({damage}); restore it from a copy", where=str(self.path))
+        # FULL: what was acknowledged survives a power cut, not just the death of this process.
         db.execute("PRAGMA journal_mode = WAL")
         db.execute("PRAGMA synchronous = FULL")
         while version != schema.version:

@@ -170,6 +170,7 @@ class _Run:
         if self.over:
             raise _STOPPED.error()
         _log.error("%s: %s", self.job.revision, error)
+        # Only deaths of its own count: one that was killed from outside says nothing about the mission.
         if error.is_own_fault and self.planner.registry.store.note_death(self.job.revision) >= MAX_ATTEMPTS:
             raise Internal(f"{error.message}; {MAX_ATTEMPTS} of them did, each on this mission", where=STAGE)
         if time.monotonic() > self.until:

@@ -193,6 +193,11 @@ class Registry(Closing):
             What is being planned.
         cancel
             Stops it; called at once where the job was cancelled before.
+
+        Yields
+        ------
+        None
+            Once; `cancel` has been called by then where the job was cancelled before.
         """
         with self._changed:
             running = self._running.get(job.revision)

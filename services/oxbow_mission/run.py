@@ -90,6 +90,7 @@ class Run:
 
     def __call__(self, endpoint: Endpoint[Q, R], request: Q, /, *, part: str = "") -> R:
         """Call a stage (`oxbow.contracts.Call`)."""
+        # What is expected is an estimate: more calls than that must not make the share exceed 1.
         fraction = min(self.calls / self.expected_calls, 1.0)
         self.calls += 1
         started = time.monotonic()

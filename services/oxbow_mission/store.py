@@ -153,10 +153,13 @@ class Store:
                 f"SELECT {_STATUS}, fingerprint FROM revision WHERE mission_id = ? AND {_LATEST}",
                 (mission_id,),
             ).fetchone()
+            # The same again, as after a lost reply: whoever sends twice gets one plan.
             if latest is not None and latest["fingerprint"] == request.fingerprint:
                 known = next(_statuses([latest]), None)
                 if known is not None and _is_settled(known):
                     return known
+            # A new revision, numbered on from the latest; one transaction, so that two senders never get one
+            # number.
             now_s = time.time()
             row = db.execute(
                 "INSERT INTO revision (mission_id, revision, client, state, changed_s, accepted_s,"
@@ -216,6 +219,11 @@ class Store:
         plan
             The completed Mission File.
 
+        Returns
+        -------
+        MissionStatus
+            That of the revision, done and not announced yet.
+
         Raises
         ------
         Internal
@@ -232,6 +240,11 @@ class Store:
             The revision, which waits or is being planned.
         error
             The reason.
+
+        Returns
+        -------
+        MissionStatus
+            That of the revision, failed and not announced yet.
 
         Raises
         ------

@@ -55,6 +55,7 @@ def answer_introspection(session: Session, instance: str, counts: Callable[[], C
             worker_pid=os.getpid(),
         )
 
+    # Stages report calls here; of a recorder, recordings are counted, and durations would mean nothing.
     def stats() -> Stats:
         now = counts()
         return Stats(
@@ -72,6 +73,7 @@ def answer_introspection(session: Session, instance: str, counts: Callable[[], C
         )
 
     answers: dict[str, Callable[[], msgspec.Struct]] = {"ping": ping, "info": info, "stats": stats}
+    # Sessions answer for several keys at once: the key that was asked says which figure is wanted.
     own_keys = {what: introspection_key(SERVICE, instance, what) for what in answers}
 
     def answer(key: str, _parameters: dict[str, str], _payload: bytes) -> Iterator[tuple[str, bytes]]:

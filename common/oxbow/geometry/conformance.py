@@ -124,10 +124,17 @@ class Shore:
             From launch to recovery, in metres; of positive length.
         launch, recovery
             Where the vehicle starts and ends. A path that begins or ends more than 1 m away has no leg there.
+
+        Returns
+        -------
+        Conduct
+            With the launch's leg first; its faults are in the order outside, unsafe, legs, crossings.
         """
+        # Where the path leaves the water, and where it comes too near to the shore.
         segments = PathSegments.of(path)
         outside = self._outside(segments)
         unsafe = self._unsafe(segments, outside)
+        # How far each leg reaches, and what of both kinds of stretches falls to it.
         total_m = segments.length_m
         off_m = shapely.distance(
             shapely.points([launch, recovery]), shapely.points(segments.ends[[0, -1], [0, 1]])
@@ -137,6 +144,7 @@ class Shore:
         legs = [
             self._leg(end, path, clipped(outside, *end.stretch), clipped(unsafe, *end.stretch)) for end in ends
         ]
+        # What is left lies between the legs, where nothing excuses it.
         between = ends[0].open_m, ends[1].open_m
         faults = [
             *_stretch_faults(Rule.OUTSIDE, path, clipped(outside, *between)),
@@ -166,6 +174,7 @@ class Shore:
         for first in range(0, len(segments.lines), _CHUNK):
             lines = segments.lines[first : first + _CHUNK]
             segment, run = self._runs.query(lines, predicate="dwithin", distance=distance_m)
+            # Each run is buffered once, however many segments come near to it.
             near, back = np.unique(run, return_inverse=True)
             bands = shapely.buffer(self._runs.geometries[near], distance_m, quad_segs=QUAD_SEGS)
             parts, pair = shapely.get_parts(shapely.intersection(lines[segment], bands[back]), return_index=True)
@@ -202,6 +211,8 @@ class Shore:
         if self.safety_m == 0.0:
             return True
         stretch = substring(path, start_m, min(end_m, start_m + LOOK_SHARE * self.safety_m))
+        # A path along the edge of the eroded water runs beside the certainly free water: as far from it as the two
+        # shares differ, and as much again to spare.
         near_m = 2.0 * (BASIN_SHARE - SAFETY_SHARE) * self.safety_m
         return bool(shapely.dwithin(self._basins_beside(stretch), stretch, near_m).any())
 
@@ -216,6 +227,7 @@ class Shore:
 
     def _leg(self, end: _End, path: LineString, outside: FloatArray, unsafe: FloatArray) -> Leg:
         """A leg, and what its place makes necessary."""
+        # The water that the leg leads to: the nearest to a place ashore may be a pond behind it.
         water = self._parts[np.argmin(shapely.distance(self._parts, path.interpolate(end.open_m)))]
         unsafe_m, ashore_m = covered_m(unsafe), float(water.distance(Point(end.place)))
         direct_m = direct_leg_m(self.safety_m, ashore_m)
@@ -235,6 +247,7 @@ class Shore:
         way = shapely.shortest_line(place, nearest)
         if way.length <= ROUNDING_M:
             return 0.0
+        # Only the land next to the place: beyond it may lie water that is too narrow, and more land behind that.
         land = shapely.get_parts(way.difference(self.water))
         return float(shapely.length(land[shapely.distance(land, place) <= ROUNDING_M]).sum())
 
@@ -244,11 +257,13 @@ class Shore:
         Open water is where the leg ends, and any basin that it passes on its way there.
         """
         way = substring(path, *end.stretch)
+        # Only the water beside the leg is triangulated: a whole lake would take long.
         parts = shapely.get_parts(way.buffer(OPEN_SHARE * self.safety_m).intersection(self.water))
         water = parts[np.argmin(shapely.distance(parts, path.interpolate(end.open_m)))]
         start = shapely.get_coordinates(shapely.shortest_line(water, Point(end.place)))[0]
         basins = self._basins_beside(way)
         open_end = path.interpolate(end.open_m).buffer(self.safety_m)
+        # The end of the leg counts as open water even where no basin is recognised there.
         goal = shapely.union_all([*basins, open_end]).intersection(water)
         if goal.is_empty or goal.covers(Point(start)):
             return 0.0
@@ -283,11 +298,18 @@ def strays(path: LineString, free: Polygon, launch: Place, recovery: Place) -> l
         Where the path should stay, to within rounding.
     launch, recovery
         What begins or ends at one of these places is a leg.
+
+    Returns
+    -------
+    list of geometries
+        Line strings longer than rounding; empty where the path keeps to the free space but for its legs.
     """
     segments = np.asarray(PathSegments.of(path).lines)
     grown = free.buffer(ROUNDING_M)
     shapely.prepare(grown)
+    # Only segments that leave go through the difference, which takes far longer than the test.
     leaving = segments[~shapely.covers(grown, segments)]
+    # Merged, since a leg is one stretch of many segments, of which only the first touches its place.
     outside = shapely.get_parts(shapely.line_merge(MultiLineString(list(leaving)).difference(grown)))
     ends = shapely.points([launch, recovery])
     is_leg = shapely.dwithin(outside[:, None], ends, ROUNDING_M).any(axis=1)
@@ -304,12 +326,14 @@ def crossings_of(path: LineString) -> tuple[Fault, ...]:
         return ()
     lines = PathSegments.of(path).lines
     last = len(lines) - 1
+    # It does cross itself: count the pairs, and keep the first for the place to report.
     tree = STRtree(lines)
     count, place = 0, shapely.get_coordinates(path)[-1]
     # In parts: in a path that is one tangle, the number of pairs grows with the square of its length.
     for start in range(0, len(lines), _CHUNK):
         i, j = tree.query(lines[start : start + _CHUNK], predicate="intersects")
         i += start
+        # Each pair is met twice, once either way: it counts where the second segment is the later one.
         meets = ~((j <= i + 1) | (path.is_closed & (i == 0) & (j == last)))
         if count == 0 and meets.any():
             first = np.flatnonzero(meets)[0]

@@ -70,6 +70,11 @@ def triangular_lattice(area: BaseGeometry, origin: Place, side_m: float) -> Floa
         A place of the lattice; odd rows from there are moved on by half a side.
     side_m
         Length of the triangles' sides, which run along x.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        In metres, row by row from the lowest; empty where no place falls into the area.
     """
     return lattice_within(area, origin, side_m, side_m * ROW, shift_m=side_m / 2)
 

@@ -53,6 +53,11 @@ class PathSegments:
             Lines on segments, shape (k,); anything else is left out.
         segment
             The segment that each lies on, shape (k,).
+
+        Returns
+        -------
+        ndarray, shape (k, 2)
+            In metres along the path, in the order of the parts; empty where all parts are points.
         """
         lines = shapely.get_type_id(parts) == shapely.GeometryType.LINESTRING
         lines &= ~shapely.is_empty(parts)
@@ -83,6 +88,11 @@ def gaps_between(stretches: FloatArray, total_m: float) -> FloatArray:
         In order, none meeting another (`merged`).
     total_m
         The length of the path.
+
+    Returns
+    -------
+    ndarray, shape (k, 2)
+        In order, and none of them empty.
     """
     rest = np.column_stack([np.append(0.0, stretches[:, 1]), np.append(stretches[:, 0], total_m)])
     return np.asarray(rest[rest[:, 1] > rest[:, 0]])
@@ -97,6 +107,11 @@ def clipped(stretches: FloatArray, start_m: float, end_m: float) -> FloatArray:
         In any order.
     start_m, end_m
         Where that one begins and ends, in metres along the path; nothing lies within where it ends first.
+
+    Returns
+    -------
+    ndarray, shape (k, 2)
+        In the order given; those that lie outside altogether are left out.
     """
     cut = np.clip(stretches, start_m, max(start_m, end_m))
     return np.asarray(cut[cut[:, 1] > cut[:, 0]])

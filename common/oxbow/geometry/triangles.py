@@ -171,6 +171,11 @@ def first_claims(triangles: Indices, neighbours: Indices) -> Mask:
     ----------
     triangles, neighbours : ndarray of int, shape (k,)
         Numbers of triangles.
+
+    Returns
+    -------
+    ndarray of bool, shape (k,)
+        True for the pairs that can be flipped at the same time; always true for the first.
     """
     rank = np.arange(len(triangles))
     first = np.full(max(triangles.max(initial=-1), neighbours.max(initial=-1)) + 1, len(rank))

@@ -88,6 +88,7 @@ def require_distinct(vehicles: Sequence[GivenVehicle]) -> None:
                     f"is {value!r}; expected a number from {LEAST_LENGTH_M:g} to {MOST_LENGTH_M:g}",
                     where=f"{where}.{_JSON_NAMES[field]}",
                 )
+        # A factor below 1 would make danger attractive.
         factors = {"Danger_factor": vehicle.danger_factor}
         factors |= {f"Danger_factors[{spot!r}]": own for spot, own in (vehicle.danger_factors or {}).items()}
         for field, factor in factors.items():

@@ -255,14 +255,17 @@ class Harbour:
         """
         start, recovery = vehicle.start, vehicle.recovery
         remote = [place for place in dict.fromkeys((start, recovery)) if self._is_remote(share, place)]
+        # Both ways come to the free space in the share itself: the path method makes the legs.
         if not remote:
             return Approach(structs.replace(self.space, free=share), start, recovery)
         ways = {place: self._to_gate(share, place) for place in remote}
+        # One gate for both, where the two are side by side: the path in the share is then closed.
         if len(ways) == 2:
             ways[recovery] = _to_one_gate(ways[start], ways[recovery], recovery)
         # The gates become vertices: no path in the share passes between them and the rim.
         for way in ways.values():
             share = shapely.snap(share, Point(way.gate), ROUNDING_M)
+        # A path from gate to gate has no legs of its own, and no business in water beyond its share.
         water = share if start in ways and recovery in ways else self.space.water
         return Approach(
             space=structs.replace(self.space, free=share, water=water),

@@ -62,12 +62,18 @@ def completed(
     teams
         The plan of each role, in the order of the mission type's roles.
 
+    Returns
+    -------
+    Mission
+        A new one; that given is unchanged. The survey of a single vehicle has no record of a fleet.
+
     Raises
     ------
     Internal
         A path does not start or end where it should, or its waypoints as written are longer than its vehicle
         may go.
     """
+    # In degrees first: what the record says of lengths is what the waypoints as written have.
     written = [[_Written.of(plan, site.frame) for plan in team.vehicles] for team in teams]
     record = PlanRecord(
         method=options.method,

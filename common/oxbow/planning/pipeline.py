@@ -108,6 +108,7 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
     >>> 0.95 * 2000.0 < planned.plan.length_m <= 2000.0
     True
     """
+    # 1. The water to plan on, at the safety distance from every shore.
     options = options or PlanOptions()
     call = CheckedCall(call)
     site = Site.of(mission)
@@ -125,11 +126,13 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
     fields = {f"places[{index}]": field for index, field in enumerate(site.ends)}
     with renamed(fields | {"least_width_m": "Least_width"}):
         space = call(CONTOUR, contour)
+    # 2. The paths of each team, one team after the other: every role has a task of its own.
     task = MissionTask(mission, options, site, space, call)
     teams = [
         treatment(task) if role is Role.SLAVE and site.hot_spots else survey(task, site.team(role))
         for role in mission.mission_type.roles
     ]
+    # 3. The record of all of it, in degrees.
     return completed(mission, options, site, task.space, teams)
 
 
@@ -148,12 +151,14 @@ def survey(task: MissionTask, team: Sequence[Member]) -> TeamPlan:
     TeamPlan
         One path per vehicle, certified together.
     """
+    # One vehicle needs no share, and its legs are the path method's own.
     if len(team) == 1:
         (member,) = team
         vehicle = member.vehicle
         whole = Approach(task.space, vehicle.start, vehicle.recovery)
         alone = (_covered(task, member, whole, task.site.area_m2),)
         return TeamPlan(alone, _certified(task, alone))
+    # Several: what each has to itself, how it gets there across the shares of others, and its path in there.
     assignment = _shared(task, team)
     areas = {share.vehicle: share.area for share in assignment.shares}
     harbour = Harbour(task.space, task.site.nominal_spacing_m)
@@ -180,6 +185,7 @@ def treatment(task: MissionTask) -> TeamPlan:
     if not assignment.sorties:
         reasons = "; ".join(f"{left.hot_spot}: {left.reason}" for left in assignment.left)
         raise Infeasible(f"has no hot spot that can be treated ({reasons})", where="PriorModel")
+    # Sorties that are made now, and those that come after them: both become paths in the same way.
     vehicles, further = (
         tuple(
             VehiclePlan(member=team[sortie.vehicle], path=sortie.path, hot_spots=sortie.hot_spots)
@@ -198,6 +204,8 @@ def expected_calls(mission: Mission) -> int:
     """How many times stages are called to plan a mission."""
     vehicles = [vehicle.role for vehicle in mission.vehicles or ()]
     counts = {role: max(vehicles.count(role), 1) for role in Role}
+    # The contour first; then, for each vehicle, a decomposition and a path, for each team its shares and
+    # certificate.
     calls = 1
     for role in mission.mission_type.roles:
         treats = role is Role.SLAVE and mission.hot_features
@@ -233,6 +241,7 @@ def _shared_part(task: MissionTask, member: Member, harbour: Harbour, share: Pol
 def _covered(task: MissionTask, member: Member, approach: Approach, water_m2: float) -> VehiclePlan:
     """A path over all of a space, with the legs to it."""
     with member.named():
+        # Legs across other shares are paid for first: the path in the share has what they leave.
         length_m = approach.length_m(member.vehicle.length_m)
         decomposition = _decomposed(task, member, approach.space, water_m2, length_m)
         plan = _path(task, member, approach, decomposition, length_m)
@@ -263,6 +272,7 @@ def _unused(path: LineString, plan: PathPlan, member: Member, length_m: float) -
 def _decomposed(
     task: MissionTask, member: Member, space: FreeSpace, water_m2: float, length_m: float
 ) -> Decomposition:
+    # Of this vehicle's share and length alone: boats of a team may differ in both.
     spacing_m = nominal_spacing_m(water_m2, length_m, task.mission.minimal_spatial_rate_m or 0.0)
     request = DecomposeRequest(free=space.free, spacing_m=spacing_m, heading_rad=task.options.heading_rad)
     return task.call(DECOMPOSE, request, part=task.part(member))

@@ -92,6 +92,11 @@ class Submission:
             Its payload, a Mission File in JSON.
         parameters
             Its parameters as text; see `SubmissionParameters`.
+
+        Returns
+        -------
+        Submission
+            With defaults for the parameters that are absent.
         """
         return cls(parse_mission(document), SubmissionParameters.parse(parameters))
 

@@ -168,6 +168,7 @@ def mission_from_geojson(  # noqa: PLR0913 - one parameter for each field of the
     geometries = list(_geometries(data))
     given = [area for geometry in geometries for area in _areas(geometry)]
     passed_over = Counter(geometry.kind for geometry in geometries if not _has_area(geometry))
+    # Areas first cut at the antimeridian are joined: their halves would be two waters.
     areas = _joined(given)
     area = _chosen(areas, part, passed_over)
     outline, *holes = (_positions(ring) for ring in area.rings)

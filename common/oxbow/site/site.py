@@ -97,21 +97,25 @@ class Site:
         Infeasible
             The forbidden zones cover all of the water.
         """
+        # 1. The plane and the outline in it.
         require_points(mission)
         contour = Contour.of(mission.outline_name, mission.outline)
         # About the mean of all points: the same contour gives the same plane wherever it begins.
         frame = Frame.around(contour.degrees)
         outline = contour.outline(frame)
         shapely.prepare(outline)
+        # 2. The water: what is left of the outline.
         forbidden = forbidden_zones(mission, frame, outline)
         zones = tuple(part for zone in forbidden for part in zone.parts)
         water = _water(outline, zones)
         if water.is_empty:
             raise Infeasible("cover all of the water; nothing is left to plan on", where="ForbiddenZones")
+        # 3. What the prior model says of it: where to survey more, what to treat, where harm threatens.
         areas = () if mission.prior_model is None else weighted_areas(mission.prior_model, frame, outline)
         spots = _hot_spots(mission, frame, outline, water)
         dangers = danger_zones(mission, frame, outline)
 
+        # 4. The vehicles, each at a place from which it can take to the water.
         def locate(name: str, position: Position) -> Place:
             return _place(name, position, frame, outline)
 

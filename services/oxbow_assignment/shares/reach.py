@@ -76,6 +76,7 @@ class Reach:
         Infeasible
             A vehicle's range is too short to survey any of the free space and go home; names the vehicle.
         """
+        # The legs: from where each vehicle starts and is recovered to the free space.
         shore = leg_routes(free, free if water is None else water)
         ways = [
             way_to(free, shore, place)
@@ -85,6 +86,7 @@ class Reach:
         docks = np.array([way[-1] for way in ways])
         # Vehicles often share their launch and recovery points: each distinct dock is searched from once.
         places, row = np.unique(docks, axis=0, return_inverse=True)
+        # And on from there, to the middle of every triangle.
         from_docks = lengths_from(free, places, mesh.centroids)[row] + legs_m[:, None]
         count = len(vehicles)
         nearest = mesh.located(docks)

@@ -151,6 +151,7 @@ def _relocations(layout: Layout, near: Indices, length: int) -> _Moves:
 def _swaps(layout: Layout, near: Indices) -> _Moves:
     """Swap two near targets of different tours."""
     rows, figures = layout.rows, layout.problem.figures
+    # Every free target with each of its near ones, where that one is free too and on another tour.
     at = np.flatnonzero(layout.is_free)
     with_ = layout.place[near[rows[at]]]
     at, with_ = np.repeat(at, with_.shape[1]), with_.ravel()
@@ -158,6 +159,7 @@ def _swaps(layout: Layout, near: Indices) -> _Moves:
     at, with_ = at[keep], with_[keep]
     one, other = layout.tour[at], layout.tour[with_]
 
+    # A tour's figures with another target in the place of its own; the neighbours stay.
     def changed(here: Indices, target: Indices) -> FloatArray:
         owner, left, right = layout.tour[here], rows[here - 1], rows[here + 1]
         added: FloatArray = figures[:, owner, left, target] + figures[:, owner, target, right]
@@ -182,6 +184,8 @@ def _tails(layout: Layout, near: Indices) -> _Moves:
     J.-Y. Potvin and J.-M. Rousseau (1995). Each vehicle still ends at its own recovery. Both vehicles must be able
     to take the same targets by their roles.
     """
+    # Cut behind any row, and go on with a near target of another tour: its predecessor goes on with the tail that
+    # was cut off.
     cut = np.flatnonzero(layout.is_open & (layout.rows < len(near)))
     join = layout.place[near[layout.rows[cut]]]
     cut, join = np.repeat(cut, join.shape[1]), join.ravel()

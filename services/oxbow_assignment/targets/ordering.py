@@ -212,12 +212,14 @@ def _best_or_opt(local: FloatArray, order: Indices, near: Indices) -> _Move:
         starts = np.arange(1, len(order) - length)
         first, last = order[starts], order[starts + length - 1]
         left, right = order[starts - 1], order[starts + length]
+        # What is saved by taking the segment out, and where it could go in: beside a near target of either end.
         saved = local[left, first] + local[last, right] - local[left, right]
         joins = position[np.concatenate([near[first], near[last]], axis=1)]
         edges = np.concatenate([joins - 1, joins], axis=1)
         since = edges - starts[:, None]
         possible = (edges >= 0) & (edges < len(order) - 1) & ((since < -1) | (since >= length))
         edges = np.where(possible, edges, 0)
+        # Either way round, whichever costs less.
         p, q, first, last = order[edges], order[edges + 1], first[:, None], last[:, None]
         kept, turned = local[p, first] + local[last, q], local[p, last] + local[first, q]
         gains = np.where(possible, saved[:, None] - np.minimum(kept, turned) + local[p, q], -np.inf)

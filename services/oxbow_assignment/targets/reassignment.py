@@ -77,6 +77,7 @@ def reassign(problem: Problem, tours: Sequence[Sequence[int]], *, hysteresis_s: 
         tour[0] if len(tour) and _first(path) == tour[0] else None for path, tour in zip(paths, tours, strict=True)
     )
     bound = frozenset(vehicle for vehicle, target in enumerate(current) if target is not None)
+    # At first every vehicle keeps its current target; each round lets one more change, or all, if that pays.
     kept = best = _Candidate.of(problem, paths, bound, current)
     while best.bound:
         # All at once too: two vehicles that should swap their targets gain nothing when only one is freed.

@@ -230,10 +230,13 @@ class Fleet:
         FleetWays
             Infinite where no route leads.
         """
+        # 1. All places that ways begin or end at.
         ends = np.array([line.coords[end] for line in lines for end in (0, -1)])
         docks = np.array([leg.coords[-1] for leg in self.out] + [leg.coords[0] for leg in self.home])
         # Slaves often share their docks: each distinct place is searched from once.
         places, rows = np.unique(np.vstack([ends, docks]), axis=0, return_inverse=True)
+        # 2. One table of routes per danger factor: the cost of danger, and with it the route, depends on who
+        # travels.
         factors = self._factors(spots or [""] * len(lines))
         tables = {factor: self._router(factor).table(places) for factor in np.unique(factors).tolist()}
         figures = np.empty((2, *factors.shape))
@@ -241,6 +244,8 @@ class Fleet:
             for own, known in zip(figures, (table.costs, table.lengths_m), strict=True):
                 known_there = np.broadcast_to(known[np.ix_(rows, rows)], factors.shape)
                 own[factors == factor] = known_there[factors == factor]
+        # 3. From the tables' rows to figures by boat, line and end; the legs to and from the docks are added on
+        # top.
         count, boats = len(lines), len(self.slaves)
         each = np.arange(boats)
         docked = [figures[:, each, 2 * count + k * boats + each, : 2 * count] for k in (0, 1)]

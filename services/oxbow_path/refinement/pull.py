@@ -145,6 +145,8 @@ class Pull:
         count = len(path.nodes)
         on = at.on(path.nodes)
         goal = on + step * (samples.points - on)
+        # A foot lies between two nodes, and each is pulled by its share: the matrix has three diagonals, and is
+        # symmetric.
         first, second = pull * (1.0 - at.share), pull * at.share
 
         def gathered(at_start: FloatArray, at_end: FloatArray) -> FloatArray:

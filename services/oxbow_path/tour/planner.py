@@ -203,6 +203,7 @@ class _Attempt:
         """The path round a tour."""
         waters, lane_m = self.waters, LANE * tour.pitch_m
         pattern = Pattern(tour.pitch_m)
+        # The lane round the tour encloses a region; its boundary is the ring that the path travels.
         walk = simply_connected(
             enclosed(shapely.get_coordinates(tour.way), waters.free, lane_m),
             waters.free,
@@ -257,6 +258,7 @@ def _shortened(attempt: _Attempt, trials: Sequence[TourTrial], budget: Budget) -
 
     Where all are too long, the last visits nothing but the entries.
     """
+    # Sites can be left out only of a tour that is too long.
     too_long = [trial for trial in trials if not trial.fits(budget)]
     if not too_long:
         return

@@ -66,6 +66,7 @@ def _solved(start: Start, order: Indices, seed: int) -> Indices:
     import pyvrp  # noqa: PLC0415
     from pyvrp.stop import MaxIterations  # noqa: PLC0415
 
+    # PyVRP takes whole numbers: lengths in units of the mean, and a forbidden step longer than any tour.
     distances = start.distances[order][:, order].toarray()
     mean_m = distances[distances > 0.0].mean()
     costs: Any = np.where(distances > 0.0, np.round(distances * (UNITS / mean_m)), UNITS * FORBIDDEN).astype(
@@ -73,6 +74,7 @@ def _solved(start: Start, order: Indices, seed: int) -> Indices:
     )
     np.fill_diagonal(costs, 0)
     count = len(order)
+    # A travelling salesman is a fleet of one, from a depot that is one of the sites; places are not used.
     problem = pyvrp.ProblemData(
         locations=[pyvrp.Location(0.0, 0.0) for _ in range(count)],
         clients=[pyvrp.Client(location) for location in range(1, count)],
@@ -90,6 +92,7 @@ def _solved(start: Start, order: Indices, seed: int) -> Indices:
         display=False,
         initial_solution=pyvrp.Solution(problem, [list(range(count - 1))]),
     )
+    # Clients count from 0, without the depot: in the matrix they are one later.
     (route,) = result.best.routes()
     clients = [activity.idx for activity in route if activity.is_client()]
     return order[[0, *(client + 1 for client in clients)]]

@@ -99,6 +99,11 @@ def access(place: Place, free: Polygon, water: Routes, *, where: str) -> Access:
     where
         What errors name the point by: `LaunchPoint` or `RecoveryPoint`.
 
+    Returns
+    -------
+    Access
+        Without a leg where the free space covers the point.
+
     Raises
     ------
     Infeasible
@@ -130,6 +135,7 @@ def _beside_leg(leg: FloatArray, landing: Landing, water: BaseGeometry) -> BaseG
     """Where a leg may run: near itself in the water, and over land on its straight way."""
     line = LineString(leg)
     near = line.buffer(BESIDE_LEG * line.length + ROUNDING_M)
+    # A place on the shore may be millimetres off the water in fact; from ashore, the way back runs a hair aside.
     graze_m = (HAIR_M if landing.is_ashore else landing.off_shore_m) + ROUNDING_M
     afloat = water.intersection(box(*near.bounds)).buffer(graze_m).intersection(near)
     if not landing.is_ashore:

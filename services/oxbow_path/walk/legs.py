@@ -98,6 +98,11 @@ def joined(
     detail_m
         How finely the way through the region follows its middle, at first.
 
+    Returns
+    -------
+    LineString
+        Simple, from launch to recovery, and inside the free space but for its legs.
+
     Raises
     ------
     Infeasible
@@ -105,6 +110,7 @@ def joined(
     Internal
         No opening gives a simple path: a fault of the construction.
     """
+    # No wider than the way back may stray from a leg, nor than a small ring can spare.
     lengths = [BESIDE_LEG * leg.line.length for leg in (launch, recovery) if leg.line.length > ROUNDING_M]
     opening_m = min([opening_m, region.exterior.length / 8, *lengths])
     allowed = launch.beside.union(recovery.beside)
@@ -115,6 +121,7 @@ def joined(
                 return path
         # Another detail makes another triangulation, whose way may keep clear of what this one touched.
         opening_m, detail_m = opening_m / 2, detail_m * OTHER_DETAIL
+    # Nothing fits. A winding leg is the mission's fault; a straight one leaves room: the construction failed.
     for leg, where in ((launch, "LaunchPoint"), (recovery, "RecoveryPoint")):
         if leg.winds:
             raise Infeasible(
@@ -140,12 +147,15 @@ def is_plainly_simple(path: LineString) -> bool:
 def _candidates(
     region: Polygon, launch: Access, recovery: Access, passable: Passable, opening_m: float, detail_m: float
 ) -> Iterator[LineString]:
+    # From one place: one ring, out and back beside one another.
     if launch.place == recovery.place:
         yield from _closed(region.exterior, launch, launch, passable.free_and_rounding, opening_m)
         return
+    # Up one creek: the two legs become one as soon as they meet, and the ring is closed again.
     if _meet(launch, recovery):
         out, home = launch.along(recovery), recovery.along(launch)
         yield from _closed(region.exterior, out, home, passable.free_and_rounding, opening_m)
+    # Entries beside each other: nearly the whole ring lies between them the long way round.
     elif shapely.distance(launch.entry, recovery.entry) <= NEAR * detail_m:
         skipped_m = SKIPPED * detail_m
         yield from _round(region.exterior, launch, recovery, passable.free_and_rounding, opening_m, skipped_m)
@@ -248,12 +258,15 @@ def _aside(place: FloatArray, towards: FloatArray, offset_m: float) -> FloatArra
 def _beside(access: Access, offset_m: float, side: float) -> FloatArray:
     """The way back along a leg, without its entry: moved aside, over land by a hair, then ever farther."""
     leg = access.leg
+    # The offset is 0 at the place, where both ways meet, and grows to the whole of it at the ring.
     steps = np.hypot(*np.diff(leg, axis=0).T)
     if len(leg) <= 2 or steps.sum() == 0:
         return leg[:1]
     along_m = np.cumsum(steps)[:-1]
     afloat_m = np.maximum(along_m - access.land_m, 0.0) / max(steps.sum() - access.land_m, ROUNDING_M)
     aside_m = (HAIR_M if access.ashore else 0.0) + offset_m * afloat_m
+    # At a vertex, square to the line between its neighbours, so that the way back keeps to one side of every
+    # bend.
     tangent = leg[2:] - leg[:-2]
     if access.ashore:
         tangent[0] = leg[1] - leg[0]
@@ -273,6 +286,7 @@ def _open(
     sight = inside.buffer(ROUNDING_M)
     start, end = (_meeting(line, leg.entry, sight) for leg in (launch, recovery))
     inner_leg = LineString([*launch.leg, *line.interpolate(start).coords])
+    # The way through must not touch the launch's own leg where that leads across the inside.
     through = Routes(_without(inside, inner_leg, opening_m / 16), detail_m)
     if not _on(inside.exterior, recovery):
         ring = _part(line, start, start - opening_m)
@@ -280,6 +294,7 @@ def _open(
         for out in (launch.leg[:-1], launch.leg):
             yield _chain(out, ring, way, recovery.leg[::-1])
         return
+    # One side, and the other one: the gap at the start is for the leg, that at the end for the recovery.
     near = _part(line, start, end - opening_m / 2)
     far = _part(line, end + opening_m / 2, start - opening_m)
     way = through.between(near[-1], far[-1])

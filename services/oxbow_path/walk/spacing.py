@@ -149,6 +149,11 @@ def interpolated(one: tuple[float, float], other: tuple[float, float], length: f
         The length of each trial, and the setting that gave it, in whatever measure makes the two about linear.
     length
         What is wanted, in the same measure.
+
+    Returns
+    -------
+    float
+        Between the two settings, a tenth of the way from either at the least.
     """
     share = (length - one[0]) / (other[0] - one[0])
     # Interpolation alone may creep towards one end, and length jumps where a transect or a site more fits.

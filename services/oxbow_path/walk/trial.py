@@ -222,6 +222,11 @@ def grown_to_entries(
         Draws the bands.
     cleaned
         Makes one polygon of the region and a band.
+
+    Returns
+    -------
+    Polygon
+        As it was, where it touches both entries.
     """
     for entry in waters.entries:
         if not shapely.dwithin(region, entry, ROUNDING_M):

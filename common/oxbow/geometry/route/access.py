@@ -48,6 +48,11 @@ class Landing:
             In the water, on its shore or ashore.
         water
             Polygons, in metres.
+
+        Returns
+        -------
+        Landing
+            Its berth is the place itself where the water covers that, however close to the shore.
         """
         point = Point(place)
         if shapely.dwithin(water, point, 0.0):
@@ -90,6 +95,11 @@ def leg_routes(free: BaseGeometry, water: Polygon) -> Routes:
         Where paths run: the water eroded by the safety distance.
     water
         What legs may cross on their way to the free space.
+
+    Returns
+    -------
+    Routes
+        Not triangulated yet: that is done when the first route is asked for.
     """
     clearance_m = float(free.boundary.distance(water.boundary))
     # At a safety distance of 0 the free space is the water: no leg has narrow water to pass.
@@ -112,6 +122,11 @@ def way_to(area: BaseGeometry, routes: Routes, place: Place) -> FloatArray:
         Routes through the water.
     place
         The start, outside the area or in it.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        In metres, from the place to the area, both included; two equal places where the area covers the place.
 
     Raises
     ------

@@ -57,6 +57,7 @@ class DynamicRouter:
         *,
         method: RouteMethod = RouteMethod.INCENTERS,
     ) -> None:
+        # On the grid from the start: parts that are cut out and put back have to fit exactly.
         self._open_water = WaterMesh.of(shapely.set_precision(water, GRID_M))
         self._danger = danger
         self._method = method
@@ -109,6 +110,11 @@ class DynamicRouter:
         ----------
         start, goal : array_like, shape (2,)
             (x, y) in metres.
+
+        Returns
+        -------
+        Route
+            It was right when it was found: obstacles that change later do not change it.
         """
         return self._router.route(start, goal)
 
@@ -127,6 +133,7 @@ class DynamicRouter:
     def _change(self, name: str, area: Polygon) -> None:
         """Replace the area that one obstacle covers; an empty area removes it."""
         obstacles = {other: polygon for other, polygon in self._obstacles.items() if other != name}
+        # Where the obstacle was, and where it will be: the water changes in both.
         changed = shapely.union(self._obstacles.get(name, Polygon()), area, grid_size=GRID_M)
         if not area.is_empty:
             obstacles[name] = area

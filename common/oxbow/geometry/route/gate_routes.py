@@ -94,6 +94,11 @@ class Routes:
             Where to, in the water.
         goals
             The area's `goals_in`; where there are none, all routes lead to a point of the area instead.
+
+        Returns
+        -------
+        Inward
+            Its routes lead to the nearest of the goals, or to the area's own point where there are none.
         """
         places = self._gates.places
         if len(goals):
@@ -122,6 +127,11 @@ class Routes:
         goals
             The area's `goals_in`. Without any, as in an area that is too small, the route ends at a point of the
             area.
+
+        Returns
+        -------
+        LineString or None
+            From the start to a goal inside the area; None where no water leads there.
 
         Raises
         ------
@@ -212,15 +222,22 @@ class Inward:
             A place of the water.
         unused_m
             How much of its beginning no later route may end on, in metres; by default, no route ends on it at all.
+
+        Returns
+        -------
+        LineString or None
+            To the area, or to where it meets an earlier route; None where no water leads there.
         """
         first = self._first(start)
         length_m = np.hypot(*(self._places[first] - start).T) + self._ways.costs[first]
         if not np.isfinite(length_m).any():
             return None
+        # The way ends at the first place that an earlier route has passed.
         way = np.array(self._ways.way(int(first[np.argmin(length_m)])))
         met = np.flatnonzero(self._passed[way])
         points = np.vstack([start, self._places[way[: met[0] + 1] if len(met) else way]])
         along_m = np.cumsum(np.hypot(*np.diff(points, axis=0).T))
+        # Near its start a route may still be abandoned: later ones must not count on those places.
         self._passed[way[: len(along_m)][along_m > unused_m]] = True
         return LineString(points)
 
@@ -237,6 +254,11 @@ def taut(route: LineString, water: BaseGeometry) -> LineString:
         In metres, of positive length.
     water
         What straight lines between vertices have to stay in.
+
+    Returns
+    -------
+    LineString
+        From the same start to the same end, and never longer.
     """
     for _ in range(2):
         points = shapely.get_coordinates(shapely.segmentize(route, route.length / TAUT_POINTS))[::-1]

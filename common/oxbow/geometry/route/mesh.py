@@ -95,6 +95,11 @@ class WaterMesh:
             Sides along the shore and the outlines are no longer than this; by default, as long as the given
             edges.
 
+        Returns
+        -------
+        WaterMesh
+            Its vertices are those of the water and the outlines, and what `detail_m` adds between them.
+
         Raises
         ------
         InvalidMission
@@ -102,6 +107,7 @@ class WaterMesh:
         """
         if water.is_empty or not shapely.is_valid(water):
             raise InvalidMission("is empty or not a valid polygon", where="water")
+        # Parted only where there are outlines: noding moves vertices by rounding, and takes time.
         faces = _parted(water, outlines) if outlines else water
         points, triangles = triangulated(faces if math.isinf(detail_m) else shapely.segmentize(faces, detail_m))
         return cls(points, triangles, twins_of(triangles))
@@ -209,6 +215,11 @@ class WaterMesh:
             In metres.
         names
             What errors call them.
+
+        Returns
+        -------
+        Touches
+            At least one triangle for each place; several for a place on a side or a corner.
 
         Raises
         ------

@@ -29,6 +29,11 @@ def make_router(method: RouteMethod, water: Polygon | MultiPolygon, danger: Dang
     danger
         Zones that may be travelled at a risk, and how much they count for one vehicle.
 
+    Returns
+    -------
+    Router
+        Ready to be asked: the water is triangulated, and the zones' outlines are among its sides.
+
     Raises
     ------
     InvalidMission
@@ -48,6 +53,11 @@ def router_on(mesh: WaterMesh, method: RouteMethod, danger: Danger) -> Router:
         How routes are found.
     danger
         Zones that may be travelled at a risk, and how much they count for one vehicle.
+
+    Returns
+    -------
+    Router
+        On that mesh, which is not copied.
     """
     match method:
         case RouteMethod.VISIBILITY:

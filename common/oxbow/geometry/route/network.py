@@ -121,6 +121,11 @@ class NetworkRouter:
         start, goal : array_like, shape (2,)
             (x, y) in metres.
 
+        Returns
+        -------
+        Route
+            Cheapest over the network; where a line is drawn over it, the line is what is measured.
+
         Raises
         ------
         InvalidMission

@@ -49,6 +49,11 @@ def retriangulated(mesh: WaterMesh, changed: BaseGeometry, water: ChangedWater) 
         Where water has appeared or disappeared; on the grid.
     water
         The water afterwards, which differs only there.
+
+    Returns
+    -------
+    WaterMesh
+        A new mesh, constrained Delaunay; the one given is unchanged. It has no triangles where no water is left.
     """
     cavity = _touched(mesh, changed)
     while True:
@@ -57,6 +62,7 @@ def retriangulated(mesh: WaterMesh, changed: BaseGeometry, water: ChangedWater) 
         if not len(loose):
             return splice.legalised()
         # A new vertex fell on the cavity's border: the triangles beyond have to take it in.
+        # The cavity only grows, and the mesh is finite: this ends.
         cavity = np.union1d(cavity, loose)
 
 
@@ -101,11 +107,13 @@ def _spliced(mesh: WaterMesh, cavity: Indices, faces: Geometries) -> tuple[_Spli
     rank = np.where(kept, np.cumsum(kept) - 1, -1)
     border = mesh.twins.reshape(-1, 3)[cavity].ravel()
     border = border[(border >= 0) & kept[border // 3]]
+    # Kept triangles come first, under new numbers; those of the cavity follow.
     first = 3 * np.count_nonzero(kept)
     fresh_twins = twins_of(fresh)
     triangles = np.vstack([mesh.triangles[kept], number[fresh]])
     kept_twins = _renumbered(mesh.twins[np.repeat(kept, 3)], rank)
     twins = np.concatenate([kept_twins, np.where(fresh_twins >= 0, fresh_twins + first, -1)])
+    # Then both are sewn together along the cavity's border, where they run between the same two vertices.
     outer = _renumbered(border, rank)
     open_sides = np.concatenate([outer, first + np.flatnonzero(fresh_twins < 0)])
     one, other = paired(triangles.ravel()[open_sides], triangles.ravel()[following(open_sides)])

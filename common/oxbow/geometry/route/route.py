@@ -81,6 +81,11 @@ class Router(Protocol):
         start, goal : array_like, shape (2,)
             (x, y) in metres.
 
+        Returns
+        -------
+        Route
+            From start to goal exactly as given.
+
         Raises
         ------
         Infeasible
@@ -129,6 +134,11 @@ def judged(polyline: FloatArray, mesh: WaterMesh, danger: Danger, method: RouteM
         The danger zones, as they count for one vehicle.
     method
         How the polyline was found.
+
+    Returns
+    -------
+    Route
+        Its cost includes the danger of the zones that it starts in.
     """
     polyline = _without_repeats(polyline)
     starts, ends = polyline[:-1], polyline[1:]

@@ -35,6 +35,11 @@ class Arcs:
             Numbers of the places where each edge begins and ends; no pair twice.
         danger
             What makes an edge cost more than its length.
+
+        Returns
+        -------
+        Arcs
+            In the order given.
         """
         return cls(tails, heads, danger.costs(places[tails], places[heads]))
 
@@ -51,6 +56,11 @@ class Arcs:
             one place is left out.
         danger
             What makes an edge cost more than its length.
+
+        Returns
+        -------
+        Arcs
+            Two for each pair, however often it occurs; none from a place to itself.
         """
         low, high = distinct(pairs.min(axis=1), pairs.max(axis=1))
         low, high = low[low < high], high[low < high]

@@ -76,6 +76,8 @@ class VisibilityGraph:
         eyes = Touches(at.place[looks], at.triangle[looks])
         seen = sights(self.mesh, bends.places, eyes, np.empty((0, 2)), Touches(nobody, nobody), wanted)
         a, b = distinct(seen.corner_eyes, bends.at_corner[seen.corners])
+        # A line that leads into the shore at one of its ends is no part of a shortest route, though the two see
+        # each other.
         useful = bends.can_be_reached(bends.places[a], b) & bends.can_be_reached(bends.places[b], a)
         return np.column_stack([a, b])[useful]
 
@@ -123,6 +125,11 @@ class Bends:
             The water.
         any_turn
             Whether routes may turn at a bend without being taut there, as danger zones make them.
+
+        Returns
+        -------
+        Bends
+            In the order of the mesh's sectors; none in convex water.
         """
         wide = mesh.angles >= STRAIGHT_RAD
         rank = np.where(wide, np.cumsum(wide) - 1, -1)
