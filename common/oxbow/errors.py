@@ -25,7 +25,7 @@ __all__ = [
     "InvalidMission",
     "OxbowError",
     "Unavailable",
-    "described",
+    "error_text",
     "renamed",
 ]
 
@@ -56,7 +56,7 @@ class OxbowError(Exception):
         return f"{self.where}: {self.message}" if self.where else self.message
 
 
-def described(error: BaseException) -> str:
+def error_text(error: BaseException) -> str:
     """Kind and text of an unexpected exception, even of one whose own `str` fails."""
     return "".join(traceback.format_exception_only(error)).strip()
 

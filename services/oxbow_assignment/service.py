@@ -9,7 +9,7 @@ from msgspec import structs
 from oxbow.contracts import Assignment, AssignRequest, Role, Share, Sortie, Vehicle
 from oxbow.geometry.route import Danger
 from oxbow.wire.recording import Show
-from oxbow_assignment.shares.sharing import shared
+from oxbow_assignment.shares.sharing import share_water
 from oxbow_assignment.show import show_campaign, show_partition, show_shares
 from oxbow_assignment.treatment.campaign import Campaign, plan_campaign
 from oxbow_assignment.treatment.sorties import Journey
@@ -79,7 +79,7 @@ def handle(request: AssignRequest, show: Show) -> Assignment:
 def _shared(request: AssignRequest, show: Show) -> Assignment:
     """The free space shared among the masters."""
     masters = _with_role(request.vehicles, Role.MASTER)
-    sharing = shared(request.free, masters, request.footprint_m, request.water)
+    sharing = share_water(request.free, masters, request.footprint_m, request.water)
     shares = tuple(
         Share(vehicle=master.name, area=area) for master, area in zip(masters, sharing.areas, strict=True)
     )

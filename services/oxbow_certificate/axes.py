@@ -9,7 +9,7 @@ from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import FloatArray
 
-__all__ = ["Paths", "long_side", "main_direction", "segment_ends", "turned"]
+__all__ = ["Paths", "coordinates_along", "long_side", "main_direction", "segment_ends"]
 
 Paths = LineString | MultiLineString
 """One vehicle's path, or those of several, one line each."""
@@ -39,7 +39,7 @@ def long_side(region: BaseGeometry) -> FloatArray:
     return np.asarray(longer / np.hypot(*longer))
 
 
-def turned(xy: FloatArray, along: FloatArray) -> FloatArray:
+def coordinates_along(xy: FloatArray, along: FloatArray) -> FloatArray:
     """Coordinates along a direction and to its left, shape (n, 2).
 
     Parameters

@@ -12,7 +12,7 @@ from scipy.stats import qmc
 from shapely import LineString, MultiPolygon
 
 from oxbow.arrays import FloatArray
-from oxbow_certificate.axes import Paths, long_side, turned
+from oxbow_certificate.axes import Paths, coordinates_along, long_side
 
 __all__ = ["Discrepancy", "discrepancy", "unit_square"]
 
@@ -65,8 +65,8 @@ def discrepancy(region: MultiPolygon, paths: Paths, spacing_m: float, tolerance_
     shapely.prepare(region)
     positions = positions[shapely.dwithin(region, shapely.points(positions), tolerance_m)]
     along = long_side(region)
-    upright = shapely.transform(region, lambda xy: turned(xy, along))
-    square = unit_square(upright, turned(positions, along))
+    upright = shapely.transform(region, lambda xy: coordinates_along(xy, along))
+    square = unit_square(upright, coordinates_along(positions, along))
     if not len(square):
         return None
     squared = float(qmc.discrepancy(square, method="CD"))

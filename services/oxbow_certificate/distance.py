@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from shapely import STRtree
 
 from oxbow.arrays import FloatArray
-from oxbow_certificate.axes import Paths, main_direction, segment_ends, turned
+from oxbow_certificate.axes import Paths, coordinates_along, main_direction, segment_ends
 
 __all__ = ["DistanceBounds", "PathDistance", "segments_of"]
 
@@ -36,13 +36,13 @@ class PathDistance:
 
     def __init__(self, paths: Paths) -> None:
         self._along = main_direction(paths)
-        upright = shapely.transform(paths, lambda xy: turned(xy, self._along))
+        upright = shapely.transform(paths, lambda xy: coordinates_along(xy, self._along))
         self._paths = paths
         self._tree = STRtree(segments_of(upright.segmentize(paths.length / _PIECES)))
 
     def __call__(self, places: FloatArray) -> FloatArray:
         """Distances (n,) in metres from `places` (n, 2) to the nearest path."""
-        points = shapely.points(turned(places, self._along))
+        points = shapely.points(coordinates_along(places, self._along))
         _, distances = self._tree.query_nearest(points, return_distance=True, all_matches=False)
         return np.asarray(distances)
 

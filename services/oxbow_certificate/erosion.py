@@ -6,7 +6,7 @@ import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-__all__ = ["eroded", "polygons"]
+__all__ = ["eroded_water", "polygons"]
 
 QUAD_SEGS = 16
 """Segments per quarter circle of an eroded contour: their chords come nearer by 0.12 % of the distance."""
@@ -15,7 +15,7 @@ _STEP_QUAD_SEGS = 4
 """The same in the steps before the last: the next step smooths their result."""
 
 
-def eroded(water: Polygon | MultiPolygon, depth_m: float, tolerance_m: float) -> BaseGeometry:
+def eroded_water(water: Polygon | MultiPolygon, depth_m: float, tolerance_m: float) -> BaseGeometry:
     """The places of `water` that are `depth_m` or more from its shore, to within about `tolerance_m`.
 
     Erosions by discs compose (Serra 1982). If the shore has edges much shorter than `depth_m`, whose offset arcs

@@ -21,7 +21,14 @@ from oxbow.arrays import FloatArray, Mask
 from oxbow.contracts import Variogram, VariogramModel
 from oxbow_certificate.axes import Paths
 
-__all__ = ["KrigingVariance", "correlation", "kriging_variance", "local_variance", "sampled", "sampling_pitch"]
+__all__ = [
+    "KrigingVariance",
+    "correlation",
+    "kriging_variance",
+    "local_variance",
+    "sample_positions",
+    "sampling_pitch",
+]
 
 PITCH = 0.1
 """The greatest distance of samples along a path, as a fraction of the variogram's range."""
@@ -75,7 +82,7 @@ def kriging_variance(
         Fractions of the sill. Far from all samples it is a little more than 1, since the mean is unknown too.
     """
     pitch_m = sampling_pitch(variogram, paths, least_radius_m)
-    samples = np.concatenate([sampled(path, pitch_m) for path in shapely.get_parts(paths)])
+    samples = np.concatenate([sample_positions(path, pitch_m) for path in shapely.get_parts(paths)])
     variances = local_variance(samples, places, variogram)
     return KrigingVariance(mean=float(variances.mean()), max=float(variances.max()))
 
@@ -102,7 +109,7 @@ def sampling_pitch(variogram: Variogram, paths: Paths, least_radius_m: float) ->
     return max(min(PITCH * variogram.range_m, least_radius_m), paths.length / MOST_SAMPLES)
 
 
-def sampled(path: LineString, pitch_m: float) -> FloatArray:
+def sample_positions(path: LineString, pitch_m: float) -> FloatArray:
     """Positions at equal distances along a path, both ends among them, shape (n, 2).
 
     Parameters

@@ -12,7 +12,7 @@ from shapely import LineString, STRtree
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import FloatArray, Indices, Place
-from oxbow_certificate.axes import main_direction, turned
+from oxbow_certificate.axes import coordinates_along, main_direction
 from oxbow_certificate.distance import segments_of
 
 __all__ = ["about_ends", "least_leg_distance"]
@@ -53,8 +53,8 @@ def least_leg_distance(path: LineString, spacing_m: float, excused: BaseGeometry
         None if no two legs face each other within four spacings.
     """
     along = main_direction(path)
-    excused = shapely.transform(excused, lambda xy: turned(xy, along))
-    path = LineString(turned(shapely.get_coordinates(path), along))
+    excused = shapely.transform(excused, lambda xy: coordinates_along(xy, along))
+    path = LineString(coordinates_along(shapely.get_coordinates(path), along))
     pieces = _Pieces.of(path, max(spacing_m, path.length / _MOST_PIECES))
     # Excused ends are not measured from; from any other end, the distance to an excused piece still counts.
     asked = np.flatnonzero(~shapely.intersects_xy(excused, pieces.ends))

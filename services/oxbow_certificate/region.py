@@ -11,7 +11,7 @@ from oxbow.contracts import CertifyRequest
 from oxbow.errors import Infeasible
 from oxbow.geometry.narrows import without_narrows
 from oxbow_certificate.cover import least_radius
-from oxbow_certificate.erosion import eroded, polygons
+from oxbow_certificate.erosion import eroded_water, polygons
 
 __all__ = ["JudgedSpace"]
 
@@ -61,7 +61,7 @@ class JudgedSpace:
         detail_m = _detail(water, request)
         # Erosion by the safety distance removes what is narrower than twice that distance anyway.
         width_m = request.least_width_m if 2 * request.safety_m < request.least_width_m else 0.0
-        parts = polygons(eroded(without_narrows(water, width_m), request.safety_m, detail_m))
+        parts = polygons(eroded_water(without_narrows(water, width_m), request.safety_m, detail_m))
         if not parts:
             raise Infeasible(
                 f"is {request.safety_m:g} m, which leaves no water; expected less than {_inradius(water):g} m",

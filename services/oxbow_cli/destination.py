@@ -66,7 +66,7 @@ class Destination:
         InvalidMission
             It cannot be written.
         """
-        with writing(self.path), ending.held():
+        with writing(self.path), ending.holding_signals():
             write_atomically(self.path, data)
 
     def keep(self, data: bytes) -> None:
@@ -77,7 +77,7 @@ class Destination:
         InvalidMission
             The data is kept elsewhere; the error says why, and where.
         """
-        with ending.held():
+        with ending.holding_signals():
             self._keep(data)
 
     def _keep(self, data: bytes) -> None:

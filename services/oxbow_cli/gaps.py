@@ -175,7 +175,7 @@ def _free_square(axes: Axes, site: Site, place: Place, side_m: float) -> Polygon
     x, y = (axis.ravel() for axis in np.meshgrid(corners_x, corners_y))
     squares = shapely.box(x, y, x + side_m, y + side_m)
     ends = shapely.MultiPoint([site.launch, site.recovery]).buffer(4 * rim_m)
-    occupied = shapely.union_all([site.outline, ends, sheet.noted(axes)]).buffer(rim_m)
+    occupied = shapely.union_all([site.outline, ends, sheet.labelled_area(axes)]).buffer(rim_m)
     free = squares[~shapely.intersects(occupied, squares)]
     return min(free, key=shapely.Point(place).distance, default=None)
 

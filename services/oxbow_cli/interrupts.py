@@ -50,7 +50,7 @@ class Ending:
             self._unwinds = False
 
     @contextmanager
-    def held(self) -> Iterator[None]:
+    def holding_signals(self) -> Iterator[None]:
         """Within this context, a signal waits: for short work that should not be left half done."""
         self._held = True
         try:

@@ -167,7 +167,7 @@ def _kept_recording(made: Path, target: Path) -> Path | None:
         return None
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        with ending.held():
+        with ending.holding_signals():
             move_into_place(made, target)
     except OSError as error:
         _log.warning("warning: the recording cannot be kept as %s: %s", target, error.strerror or error)

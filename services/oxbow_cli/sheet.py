@@ -28,7 +28,7 @@ from oxbow.arrays import Place
 from oxbow.errors import InvalidMission
 from oxbow.mission.files import write_atomically
 from oxbow.site.site import Site
-from oxbow_certificate.erosion import eroded
+from oxbow_certificate.erosion import eroded_water
 from oxbow_cli.interrupts import ending
 
 __all__ = [
@@ -45,11 +45,11 @@ __all__ = [
     "draw_header",
     "draw_scale_and_north",
     "draw_site",
+    "labelled_area",
     "lettering",
     "line_width",
     "new_sheet",
     "note",
-    "noted",
     "patch",
     "save_sheet",
 ]
@@ -128,7 +128,7 @@ def save_sheet(figure: Figure, path: Path, width_px: int) -> None:
     # Without a date, the same mission gives the same file.
     metadata = {"Date": None} if kind == "svg" else {}
     figure.savefig(picture, format=kind, dpi=_DPI * width_px / 2000, metadata=metadata)
-    with ending.held():
+    with ending.holding_signals():
         write_atomically(path, picture.getvalue())
 
 
@@ -186,7 +186,7 @@ def draw_site(axes: Axes, site: Site, safety_m: float) -> None:
         )
     )
     axes.add_patch(patch(water, facecolor=MARGIN, edgecolor=SHORE, linewidth=0.7, zorder=2))
-    axes.add_patch(patch(eroded(water, safety_m, pixel_m / 4), facecolor=WATER, edgecolor="none", zorder=3))
+    axes.add_patch(patch(eroded_water(water, safety_m, pixel_m / 4), facecolor=WATER, edgecolor="none", zorder=3))
 
 
 def patch(geometry: BaseGeometry, **style: object) -> PathPatch:
@@ -260,7 +260,7 @@ def note(axes: Axes, place: Place, text: str, *, colour: str) -> None:
     )
 
 
-def noted(axes: Axes) -> BaseGeometry:
+def labelled_area(axes: Axes) -> BaseGeometry:
     """The area that the labels on a map cover, in metres of the map."""
     to_data = axes.transData.inverted()
     corners = [to_data.transform(text.get_window_extent().get_points()) for text in axes.texts]

@@ -89,7 +89,7 @@ def running_stack(settings: StackSettings, output: int | None = None) -> Iterato
         A process ended before it was ready, or was not ready after `START_S`.
     """
     with Supervisor(output) as supervisor:
-        with ending.held():  # so that the supervisor knows every process that was started
+        with ending.holding_signals():  # so that the supervisor knows every process that was started
             started = _start(supervisor, settings)
         give_up = time.monotonic() + START_S
         with _connected(settings.endpoint, supervisor, give_up) as bus:

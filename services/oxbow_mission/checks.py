@@ -7,7 +7,7 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 
-from oxbow.errors import Busy, DeadlineExceeded, Internal, InvalidMission, OxbowError, described
+from oxbow.errors import Busy, DeadlineExceeded, Internal, InvalidMission, OxbowError, error_text
 from oxbow.runtime.closing import Closing
 from oxbow_mission.fair import FairQueue
 from oxbow_mission.helper import Helper, HelperDied, Helpers
@@ -138,7 +138,7 @@ class _Lane:
         except OxbowError as error:
             incoming.fail(error)
         except BaseException as error:
-            incoming.fail(Internal(described(error), where="mission"))
+            incoming.fail(Internal(error_text(error), where="mission"))
             raise
 
     def _checked(self, check: Check, helper: Helper) -> Checked | None:

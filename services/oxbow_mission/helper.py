@@ -17,7 +17,7 @@ import msgspec
 from oxbow.errors import DeadlineExceeded, Internal, OxbowError
 from oxbow.runtime.closing import Closing
 from oxbow.stage.watch import Verdict, Watch
-from oxbow.stage.worker import ended, is_want_of_memory, needs_memory, one_threaded
+from oxbow.stage.worker import ending_text, is_want_of_memory, needs_memory, one_threaded
 from oxbow_mission.wire import (
     STAGE,
     Answer,
@@ -231,7 +231,7 @@ class Helper(Closing):
             return needs_memory(self.memory_mb, STAGE)
         # The kernel's and the operator's ways to end a process; a fault of its own ends it by another signal.
         from_outside = watch.verdict is Verdict.FROZEN or status in (-signal.SIGKILL, -signal.SIGTERM)
-        return HelperDied(f"helper process {process.pid} {ended(status)}", is_own_fault=not from_outside)
+        return HelperDied(f"helper process {process.pid} {ending_text(status)}", is_own_fault=not from_outside)
 
 
 class Helpers(Closing):

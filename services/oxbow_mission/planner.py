@@ -14,7 +14,7 @@ import msgspec
 from oxbow.bus.client import Bus, BusCall
 from oxbow.bus.query import MSGPACK
 from oxbow.contracts import STAGES, any_layer_key, layer_key
-from oxbow.errors import DeadlineExceeded, ErrorReply, Internal, OxbowError, Unavailable, described
+from oxbow.errors import DeadlineExceeded, ErrorReply, Internal, OxbowError, Unavailable, error_text
 from oxbow.planning.submission import SubmissionParameters
 from oxbow.runtime.closing import Closing
 from oxbow_mission.fair import Turns
@@ -118,7 +118,7 @@ class Planner(Closing):
             return error
         except BaseException as error:  # noqa: BLE001 - becomes an `internal` error
             _log.exception("%s", job.revision)
-            return Internal(described(error), where=STAGE)
+            return Internal(error_text(error), where=STAGE)
 
 
 class _Run:
@@ -204,7 +204,7 @@ class _Run:
             answer = Answer(error=ErrorReply.of(error))
         except BaseException as error:  # noqa: BLE001 - becomes an `internal` error
             _log.exception("%s: %s", self.job.revision, ask.stage)
-            answer = Answer(error=ErrorReply.of(Internal(described(error), where=ask.stage)))
+            answer = Answer(error=ErrorReply.of(Internal(error_text(error), where=ask.stage)))
         finally:
             answers.put(answer)
 

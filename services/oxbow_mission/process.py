@@ -10,7 +10,7 @@ import logging
 import sys
 from multiprocessing.connection import Connection
 
-from oxbow.errors import ErrorReply, Internal, OxbowError, described
+from oxbow.errors import ErrorReply, Internal, OxbowError, error_text
 from oxbow.stage.jobs import is_memory_error
 from oxbow.stage.process import guard
 from oxbow.stage.worker import needs_memory
@@ -49,7 +49,7 @@ def _outcome(order: ToHelper, handler: Handler, peer: Peer, memory_mb: int) -> F
         if is_memory_error(error):
             return HelperFailed(error=ErrorReply.of(needs_memory(memory_mb, STAGE)))
         _log.exception("%s failed", type(order).__name__)
-        return HelperFailed(error=ErrorReply.of(Internal(described(error), where=STAGE)))
+        return HelperFailed(error=ErrorReply.of(Internal(error_text(error), where=STAGE)))
 
 
 if __name__ == "__main__":

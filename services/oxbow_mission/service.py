@@ -23,7 +23,7 @@ from oxbow.contracts import (
     mission_key,
 )
 from oxbow.contracts.ids import excerpt
-from oxbow.errors import ErrorReply, Internal, InvalidMission, OxbowError, described
+from oxbow.errors import ErrorReply, Internal, InvalidMission, OxbowError, error_text
 from oxbow.runtime.closing import Closing
 from oxbow_mission.checks import Checks
 from oxbow_mission.incoming import PutRequest, QueriedPlan, QueriedRequest
@@ -111,7 +111,7 @@ class MissionService(Closing):
                 _fail(query, error)
             except BaseException as error:  # noqa: BLE001 - an unanswered query looks like no service
                 _log.exception("a query has no answer")
-                _fail(query, Internal(described(error), where="mission"))
+                _fail(query, Internal(error_text(error), where="mission"))
 
         return accept
 

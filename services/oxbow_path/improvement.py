@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from shapely import LineString
 
 from oxbow.contracts import SpacingStep
-from oxbow_path.refinement import Polyline, refined
+from oxbow_path.refinement import Polyline, refined_path
 from oxbow_path.task import Display, MethodPlan, Task
 from oxbow_path.walk.spacing import Fit
 from oxbow_path.walk.trial import Trial
 
-__all__ = ["improved", "method_plan", "spacing_steps"]
+__all__ = ["improved_line", "method_plan", "spacing_steps"]
 
 
-def improved(path: Polyline, task: Task, display: Display) -> LineString:
+def improved_line(path: Polyline, task: Task, display: Display) -> LineString:
     """The path refined for the task; one already longer than is useful may stay as long.
 
     Parameters
@@ -34,7 +34,7 @@ def improved(path: Polyline, task: Task, display: Display) -> LineString:
     """
     # A path that fits keeps its length, even where less would be useful: shortening it would open gaps.
     fits = task.budget.fits(path.length_m)
-    return refined(
+    return refined_path(
         path,
         task.waters.free,
         task.samples,

@@ -15,14 +15,14 @@ from oxbow.wire.recording import Show
 from oxbow_path.conformance import require_conforming
 from oxbow_path.course import best_plan
 from oxbow_path.dropped import dropped_parts
-from oxbow_path.refinement import Polyline, smoothed
+from oxbow_path.refinement import Polyline, smoothed_path
 from oxbow_path.space_filling_curve import space_filling_curve
 from oxbow_path.task import Display, MethodPlan, PathMethod, Stop, Task, finest_spacing_m
 from oxbow_path.tour import tour
 from oxbow_path.transect import transects
 from oxbow_path.watershed import watershed
 
-__all__ = ["METHODS", "handle", "planned"]
+__all__ = ["METHODS", "handle", "planned_path"]
 
 METHODS: dict[Method, PathMethod] = {
     Method.SPACE_FILLING_CURVE: space_filling_curve,
@@ -50,10 +50,10 @@ def handle(request: PathRequest, show: Show) -> PathPlan:
     PathPlan
         A path that keeps to the rules of `require_conforming`, and the water that it leaves far away.
     """
-    return planned(request, _stop(request.time_limit_s), show)
+    return planned_path(request, _stop(request.time_limit_s), show)
 
 
-def planned(request: PathRequest, stop: Stop, show: Show) -> PathPlan:
+def planned_path(request: PathRequest, stop: Stop, show: Show) -> PathPlan:
     """Plan as `handle` does, with a clock of the caller's.
 
     Parameters
@@ -102,7 +102,7 @@ def planned(request: PathRequest, stop: Stop, show: Show) -> PathPlan:
 
 def _smoothed(path: LineString, task: Task) -> LineString:
     polyline = Polyline.of(path, task.waters.passable.free_and_rounding)
-    return smoothed(polyline, task.waters.free, task.spacing_m)
+    return smoothed_path(polyline, task.waters.free, task.spacing_m)
 
 
 def _stop(limit_s: float | None) -> Stop:

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, box
 
-from oxbow_certificate.axes import long_side, main_direction, turned
+from oxbow_certificate.axes import coordinates_along, long_side, main_direction
 from oxbow_certificate.distance import PathDistance
 
 quick = settings(max_examples=20)
@@ -28,8 +28,10 @@ def test_distance_is_shapelys(walk, shift):
 def test_axes_lie_along_rows_and_rectangles(angle):
     rows = np.array([(0, 0), (100, 0), (100, 5), (0, 5), (0, 10), (100, 10)])
     along = np.array([np.cos(angle), np.sin(angle)])
-    back = turned(rows, np.array([np.cos(angle), -np.sin(angle)]))
+    back = coordinates_along(rows, np.array([np.cos(angle), -np.sin(angle)]))
     assert abs(main_direction(LineString(back)) @ along) == pytest.approx(1)
-    rectangle = shapely.transform(box(0, 0, 30, 10), lambda xy: turned(xy, np.array([along[0], -along[1]])))
+    rectangle = shapely.transform(
+        box(0, 0, 30, 10), lambda xy: coordinates_along(xy, np.array([along[0], -along[1]]))
+    )
     assert abs(long_side(rectangle) @ along) == pytest.approx(1)
-    assert turned(back, along) == pytest.approx(rows, abs=1e-9)
+    assert coordinates_along(back, along) == pytest.approx(rows, abs=1e-9)

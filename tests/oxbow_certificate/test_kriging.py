@@ -16,7 +16,7 @@ from oxbow_certificate.kriging import (
     correlation,
     kriging_variance,
     local_variance,
-    sampled,
+    sample_positions,
     sampling_pitch,
 )
 from oxbow_certificate.spread import even_places
@@ -99,7 +99,9 @@ def test_a_sample_that_is_both_near_and_spread_counts_once(model, range_m, count
 def test_a_smooth_field_sampled_densely_and_twice_stays_within_zero_and_one(model):
     path = LineString([(0, y) if (y // 2 + x) % 2 else (100, y) for y in range(0, 100, 2) for x in (0, 1)])
     there_and_back = LineString([*path.coords, *path.coords[::-1]])
-    found = local_variance(sampled(there_and_back, 1.0), even_places(SQUARE, 500), variogram(model, 1000.0))
+    found = local_variance(
+        sample_positions(there_and_back, 1.0), even_places(SQUARE, 500), variogram(model, 1000.0)
+    )
     assert (found >= -1e-12).all()
     assert found.max() < 0.05
 
@@ -119,9 +121,9 @@ def test_scale_makes_no_difference(model, range_m, scale):
 
 def test_samples_lie_on_the_path_evenly_from_end_to_end():
     path = LineString([(0, 0), (10, 0), (10, 0), (10, 5)])
-    samples = sampled(path, 4.0)
+    samples = sample_positions(path, 4.0)
     assert samples.tolist() == [[0, 0], [3.75, 0], [7.5, 0], [10, 1.25], [10, 5]]
-    assert len(sampled(path, 100.0)) == 2
+    assert len(sample_positions(path, 100.0)) == 2
 
 
 def test_the_pitch_follows_range_and_spacing_and_is_bounded():

@@ -99,7 +99,7 @@ def test_what_should_not_be_left_half_done_ends_before_the_command_does():
     code = (
         "import os, signal\nfrom oxbow_cli.interrupts import ending\nending.begin()\n"
         "try:\n    with ending.orderly():\n"
-        "        with ending.held():\n            os.kill(os.getpid(), signal.SIGINT); print('held')\n"
+        "        with ending.holding_signals():\n            os.kill(os.getpid(), signal.SIGINT); print('held')\n"
         "        print('not reached')\n"
         "finally:\n    print('left in order')\n"
     )

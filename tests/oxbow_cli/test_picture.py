@@ -96,7 +96,7 @@ def test_a_name_is_plain_text(planned, tmp_path):
 def test_labels_cover_the_place_where_they_are_written():
     _, axes = sheet.new_sheet(Site.of(SITE))
     sheet.note(axes, (0.0, 0.0), "a label of some length", colour="black")
-    west, south, east, north = sheet.noted(axes).bounds
+    west, south, east, north = sheet.labelled_area(axes).bounds
     assert 0 < west < 0.1 * (east - west), "to the right of its place"
     assert 0 < north - south < 0.2 * (east - west)
 

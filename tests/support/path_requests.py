@@ -17,7 +17,7 @@ from oxbow.testing import nasty_polygons
 from oxbow.wire.recording import discard
 from oxbow_contour.service import handle as contour
 from oxbow_decomposition.service import handle as decompose
-from oxbow_path.service import planned
+from oxbow_path.service import planned_path
 
 
 def lake(seed: int, *, roughness: float = 0.3, vertices: int = 150, radius_m: float = 1000.0) -> Polygon:
@@ -106,4 +106,4 @@ def soon_planned(asked: PathRequest, steps: int = 2) -> PathPlan:
     """
     assert asked.time_limit_s is not None
     taken = itertools.count()
-    return planned(asked, lambda: next(taken) >= steps, discard)
+    return planned_path(asked, lambda: next(taken) >= steps, discard)

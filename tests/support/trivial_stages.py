@@ -34,7 +34,7 @@ from oxbow.contracts import (
     PathRequest,
     Sortie,
 )
-from oxbow.errors import ErrorReply, Infeasible, Internal, OxbowError, described
+from oxbow.errors import ErrorReply, Infeasible, Internal, OxbowError, error_text
 from oxbow.runtime.lifetime import Lifetime
 from oxbow.wire import codec
 from oxbow.wire.envelope import StageError
@@ -108,7 +108,7 @@ def answering(
                 reply = NESTED if getattr(request, "seed", 0) == POISON_SEED else codec.encode(handle(request))
                 query.reply(key, reply, encoding=MSGPACK, attachment=request_id.encode())
             except Exception as error:  # noqa: BLE001 - as a stage does
-                known = error if isinstance(error, OxbowError) else Internal(described(error), where=key)
+                known = error if isinstance(error, OxbowError) else Internal(error_text(error), where=key)
                 query.fail(StageError.about(request_id, ErrorReply.of(known)))
 
     return lambda query: pool.submit(answer, query)

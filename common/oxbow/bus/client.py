@@ -11,7 +11,7 @@ import msgspec
 import zenoh
 
 from oxbow.bus.replicas import Replicas
-from oxbow.bus.session import Session, error_of, is_timeout, told_error
+from oxbow.bus.session import Session, error_of, error_of_reply, is_timeout
 from oxbow.contracts import ANY_LIVE, MAX_REQUEST_BYTES, Endpoint, Message, live_service
 from oxbow.contracts.ids import MOST_ID_CHARACTERS
 from oxbow.errors import Busy, DeadlineExceeded, ErrorCode, Internal, InvalidMission, OxbowError, Unavailable
@@ -278,7 +278,7 @@ class _Attempts(Generic[A]):
         # Zenoh's time-out carries no request id, so it is recognized before the id is checked.
         if is_timeout(reply):
             return error_of(reply, key, timeout_s)
-        told = told_error(reply, key)
+        told = error_of_reply(reply, key)
         if told.request_id != self.envelope.request_id:
             whose = f"an error to request {told.request_id[:MOST_ID_CHARACTERS]!r}"
             return _Failed(f"{key} replied {whose}, not to {self.envelope.request_id!r}: {told.message}", WRONG)

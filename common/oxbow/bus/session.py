@@ -30,14 +30,14 @@ from oxbow.errors import (
     InvalidMission,
     OxbowError,
     Unavailable,
-    described,
+    error_text,
 )
 from oxbow.runtime.closing import Closing
 from oxbow.wire.envelope import StageError
 from oxbow.wire.strict_json import decode_json
 from oxbow.wire.waits import checked_wait
 
-__all__ = ["MOST_KEY_BYTES", "Session", "error_of", "is_timeout", "told_error"]
+__all__ = ["MOST_KEY_BYTES", "Session", "error_of", "error_of_reply", "is_timeout"]
 
 MOST_KEY_BYTES = 4096
 """The key of an id of 128 characters, percent-encoded, is far shorter."""
@@ -465,7 +465,7 @@ def error_of(reply: zenoh.ReplyError, selector: str, timeout_s: float) -> OxbowE
     """
     if is_timeout(reply):
         return DeadlineExceeded(f"no answer within {timeout_s:.1f} s", where=selector)
-    return told_error(reply, selector).error()
+    return error_of_reply(reply, selector).error()
 
 
 def is_timeout(reply: zenoh.ReplyError) -> bool:
@@ -473,7 +473,7 @@ def is_timeout(reply: zenoh.ReplyError) -> bool:
     return str(reply.encoding) != JSON
 
 
-def told_error(reply: zenoh.ReplyError, selector: str) -> StageError:
+def error_of_reply(reply: zenoh.ReplyError, selector: str) -> StageError:
     """The error that was replied; one that cannot be read is `internal`.
 
     Parameters
@@ -499,4 +499,4 @@ def told_error(reply: zenoh.ReplyError, selector: str) -> StageError:
 def _fail(query: Query, error: BaseException, where: str) -> None:
     """Answer a query that ended in an exception which nobody expected."""
     _log.error("%s: no answer", where, exc_info=error)
-    query.fail(ErrorReply.of(Internal(described(error), where=where)))
+    query.fail(ErrorReply.of(Internal(error_text(error), where=where)))

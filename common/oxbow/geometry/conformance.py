@@ -25,7 +25,7 @@ from oxbow.arrays import FloatArray, Geometries, Place
 from oxbow.contracts import Fault, Leg, Rule
 from oxbow.geometry.narrows import DETOUR, direct_leg_m, is_basin, without_narrows
 from oxbow.geometry.route.gate_routes import Routes
-from oxbow.geometry.stretches import PathSegments, clipped, covered_m, gaps_between, merged
+from oxbow.geometry.stretches import PathSegments, clipped_stretches, covered_m, gaps_between, merged_stretches
 from oxbow.tolerances import ROUNDING_M
 
 __all__ = ["Conduct", "Shore", "crossings_of", "strays"]
@@ -142,13 +142,14 @@ class Shore:
         out_m, home_m = np.where(off_m > SAME_PLACE_M, 0.0, self._leg_lengths(path, unsafe)).tolist()
         ends = (_End("launch", launch, 0.0, out_m), _End("recovery", recovery, total_m, total_m - home_m))
         legs = [
-            self._leg(end, path, clipped(outside, *end.stretch), clipped(unsafe, *end.stretch)) for end in ends
+            self._leg(end, path, clipped_stretches(outside, *end.stretch), clipped_stretches(unsafe, *end.stretch))
+            for end in ends
         ]
         # What is left lies between the legs, where nothing excuses it.
         between = ends[0].open_m, ends[1].open_m
         faults = [
-            *_stretch_faults(Rule.OUTSIDE, path, clipped(outside, *between)),
-            *_stretch_faults(Rule.UNSAFE, path, clipped(unsafe, *between)),
+            *_stretch_faults(Rule.OUTSIDE, path, clipped_stretches(outside, *between)),
+            *_stretch_faults(Rule.UNSAFE, path, clipped_stretches(unsafe, *between)),
             *(fault for end, leg in zip(ends, legs, strict=True) for fault in _leg_faults(end, leg, path)),
             *crossings_of(path),
         ]
@@ -165,7 +166,7 @@ class Shore:
         if distance_m <= SHORE_TOLERANCE_M:
             return outside
         # Far inland no shore is near: only together do the two cover a path over land.
-        return merged(np.vstack([outside, self._near(segments, distance_m)]))
+        return merged_stretches(np.vstack([outside, self._near(segments, distance_m)]))
 
     def _near(self, segments: PathSegments, distance_m: float) -> FloatArray:
         """Stretches of a path that are nearer to the shore than a distance."""
@@ -179,7 +180,7 @@ class Shore:
             bands = shapely.buffer(self._runs.geometries[near], distance_m, quad_segs=QUAD_SEGS)
             parts, pair = shapely.get_parts(shapely.intersection(lines[segment], bands[back]), return_index=True)
             found.append(segments.stretches(parts, first + segment[pair]))
-        return merged(np.vstack(found))
+        return merged_stretches(np.vstack(found))
 
     def _leg_lengths(self, path: LineString, unsafe: FloatArray) -> tuple[float, float]:
         """How far a path's first and its last leg reach.

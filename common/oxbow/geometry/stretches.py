@@ -13,7 +13,7 @@ from shapely import LineString
 
 from oxbow.arrays import FloatArray, Geometries, Indices
 
-__all__ = ["PathSegments", "clipped", "covered_m", "gaps_between", "merged"]
+__all__ = ["PathSegments", "clipped_stretches", "covered_m", "gaps_between", "merged_stretches"]
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class PathSegments:
         return np.asarray(np.sort(along, axis=1))
 
 
-def merged(stretches: FloatArray) -> FloatArray:
+def merged_stretches(stretches: FloatArray) -> FloatArray:
     """The same stretches in order, with those that meet joined."""
     if len(stretches) == 0:
         return stretches
@@ -85,7 +85,7 @@ def gaps_between(stretches: FloatArray, total_m: float) -> FloatArray:
     Parameters
     ----------
     stretches
-        In order, none meeting another (`merged`).
+        In order, none meeting another (`merged_stretches`).
     total_m
         The length of the path.
 
@@ -98,7 +98,7 @@ def gaps_between(stretches: FloatArray, total_m: float) -> FloatArray:
     return np.asarray(rest[rest[:, 1] > rest[:, 0]])
 
 
-def clipped(stretches: FloatArray, start_m: float, end_m: float) -> FloatArray:
+def clipped_stretches(stretches: FloatArray, start_m: float, end_m: float) -> FloatArray:
     """The parts of stretches that lie within another.
 
     Parameters

@@ -24,7 +24,7 @@ from oxbow.mission.plan import PlanOptions, PlanRecord
 from oxbow.mission.prior import PriorFeature, PriorModel, parse_prior, prior_document
 from oxbow.mission.vehicles import GivenVehicle, VehiclePath, require_distinct
 from oxbow.tolerances import DEFAULT_LEAST_WIDTH_M, DEFAULT_SHORE_TOLERANCE_M, FARTHEST_M
-from oxbow.wire.strict_json import decode_json, document_of, gathered, gathered_part, utf8
+from oxbow.wire.strict_json import decode_json, document_of, part_with_extra, utf8, with_extra
 
 __all__ = [
     "Bloom",
@@ -310,7 +310,7 @@ def parse_mission(data: bytes) -> Mission:
     """
     if len(data) > MAX_REQUEST_BYTES:
         raise InvalidMission(f"is {len(data)} bytes; expected at most {MAX_REQUEST_BYTES}", where="Mission File")
-    document = gathered(
+    document = with_extra(
         decode_json(utf8(data, "Mission File"), dict[str, msgspec.Raw], "Mission File"), FIELD_NAMES
     )
     # Both names are accepted, and the one that was used is written back: other programs may know only that.
@@ -322,7 +322,7 @@ def parse_mission(data: bytes) -> Mission:
         )
     for name, (kind, is_list) in _PARTS.items():
         if name in document:
-            document[name] = gathered_part(bytes(document[name]), kind, name, is_list=is_list)
+            document[name] = part_with_extra(bytes(document[name]), kind, name, is_list=is_list)
     if names:
         document["BoundingBox"] = document.pop(names[0])
         document["outline_name"] = msgspec.Raw(msgspec.json.encode(names[0]))

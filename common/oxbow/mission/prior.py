@@ -23,7 +23,7 @@ from oxbow.contracts import Variogram
 from oxbow.errors import InvalidMission
 from oxbow.geometry.crossings import MOST_PAIRS, TooManyPairs, is_valid
 from oxbow.mission.coordinates import GivenPoint, GivenPolygon, lonlat_of, require_wgs84
-from oxbow.wire.strict_json import decode_json, gathered, utf8
+from oxbow.wire.strict_json import decode_json, utf8, with_extra
 
 __all__ = ["PriorFeature", "PriorModel", "parse_prior", "prior_document"]
 
@@ -204,7 +204,7 @@ def _feature(document: dict[str, msgspec.Raw], index: int) -> PriorFeature:
 def _decoded(document: dict[str, msgspec.Raw], kind: type[T]) -> T:
     """An object's known members as the fields of a struct, and the others as its `extra`."""
     known = frozenset(kind.__struct_fields__) - {"extra"}
-    return decode_json(msgspec.json.encode(gathered(document, known)), kind, "")
+    return decode_json(msgspec.json.encode(with_extra(document, known)), kind, "")
 
 
 @contextmanager

@@ -111,7 +111,7 @@ class Approach:
         )
         return SPARE * max(self.out.length_m + self.home.length_m, *beside_m)
 
-    def joined(self, path: LineString) -> LineString:
+    def with_legs(self, path: LineString) -> LineString:
         """A path in the share, with its legs: from the vehicle's start to its recovery.
 
         Raises
@@ -140,7 +140,7 @@ class Approach:
             # Two gates: the middle lines themselves may be clear of each other.
             yield _Candidate(self.out.points, path, self.home.points[::-1])
         line = LineString(path)
-        # From wide to narrow: `joined` takes the first that fits, and legs far apart are the easiest to follow.
+        # From wide to narrow: `with_legs` takes the first that fits, and legs far apart are the easiest to follow.
         for apart_m in self.apart_m * 0.5 ** np.arange(HALVINGS):
             for side, way in itertools.product((1.0, -1.0), self._ways_round(line, apart_m)):
                 yield _Candidate(self.out.beside(side * apart_m), way, self.home.beside(-side * apart_m)[::-1])

@@ -33,7 +33,7 @@ from oxbow.mission.vehicles import VehiclePath
 from oxbow.site.fleet import Member, TeamPlan, VehiclePlan
 from oxbow.site.site import Site
 
-__all__ = ["completed"]
+__all__ = ["completed_mission"]
 
 SAME_PLACE_M = 1e-3
 """A path ends where it should if it ends no farther than this from there: a millimetre."""
@@ -42,7 +42,7 @@ LONG_LEG = 2.0
 """A leg with more than this many safety distances within Safety is warned about: it does not lead straight off."""
 
 
-def completed(
+def completed_mission(
     mission: Mission, options: PlanOptions, site: Site, space: FreeSpace, teams: Sequence[TeamPlan]
 ) -> Mission:
     """The mission with its paths and its `Plan`; older paths and an older plan are replaced.
@@ -181,7 +181,7 @@ def _unsafe_legs(mission: Mission, team: TeamPlan) -> Iterator[str]:
         for field, leg in zip(("LaunchPoint", "RecoveryPoint"), track.legs, strict=False):
             if field == "RecoveryPoint" and vehicle.recovery == vehicle.start:
                 continue
-            where = plan.member.told(plan.member.fields.get(field, field))
+            where = plan.member.with_name(plan.member.fields.get(field, field))
             if leg.ashore_m > 0.0:
                 yield f"{where} lies ashore: {leg.ashore_m:.3g} m of its leg lead over land"
             if leg.unsafe_m > LONG_LEG * mission.safety_m + leg.ashore_m:

@@ -34,7 +34,7 @@ from oxbow.errors import Infeasible, renamed
 from oxbow.geometry.conformance import Shore
 from oxbow.mission.file import Mission, PlanOptions
 from oxbow.planning.approach import Approach, Harbour
-from oxbow.planning.completion import completed
+from oxbow.planning.completion import completed_mission
 from oxbow.planning.verification import CheckedCall, require_faultless, require_fit_to_follow
 from oxbow.site.fleet import Member, TeamPlan, VehiclePlan
 from oxbow.site.site import Site
@@ -133,7 +133,7 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
         for role in mission.mission_type.roles
     ]
     # 3. The record of all of it, in degrees.
-    return completed(mission, options, site, task.space, teams)
+    return completed_mission(mission, options, site, task.space, teams)
 
 
 def survey(task: MissionTask, team: Sequence[Member]) -> TeamPlan:
@@ -233,19 +233,19 @@ def _shared(task: MissionTask, team: Sequence[Member]) -> Assignment:
 
 
 def _shared_part(task: MissionTask, member: Member, harbour: Harbour, share: Polygon) -> VehiclePlan:
-    with member.named():
+    with member.naming_fields():
         approach = harbour.approach(share, member.vehicle)
     return _covered(task, member, approach, share.area)
 
 
 def _covered(task: MissionTask, member: Member, approach: Approach, water_m2: float) -> VehiclePlan:
     """A path over all of a space, with the legs to it."""
-    with member.named():
+    with member.naming_fields():
         # Legs across other shares are paid for first: the path in the share has what they leave.
         length_m = approach.length_m(member.vehicle.length_m)
         decomposition = _decomposed(task, member, approach.space, water_m2, length_m)
         plan = _path(task, member, approach, decomposition, length_m)
-        path = approach.joined(plan.path)
+        path = approach.with_legs(plan.path)
         return VehiclePlan(
             member=member,
             path=path,

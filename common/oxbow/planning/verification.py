@@ -120,7 +120,7 @@ def require_faultless(faults: Iterable[Fault], frame: Frame, plans: Sequence[Veh
         plan = plans[fault.track]
         # A way home may cross the way out where hot spots are treated between them.
         if fault.rule is not Rule.CROSSING or not plan.hot_spots:
-            raise Internal(_unfit(fault, frame), plan.member.told("path"))
+            raise Internal(_unfit(fault, frame), plan.member.with_name("path"))
 
 
 def _unfit(fault: Fault, frame: Frame) -> str:

@@ -49,11 +49,11 @@ class Member:
         """What the Mission File calls a field that stages know by this name."""
         return self.fields.get(name, name)
 
-    def told(self, warning: str) -> str:
+    def with_name(self, warning: str) -> str:
         """A warning, with the name of the vehicle where the Mission File names its vehicles."""
         return f"{self.vehicle.name}: {warning}" if self.is_named else warning
 
-    def named(self) -> AbstractContextManager[None]:
+    def naming_fields(self) -> AbstractContextManager[None]:
         """A context in which errors name this vehicle's fields of the Mission File."""
         return renamed(self.fields)
 
@@ -114,7 +114,7 @@ class TeamPlan:
     def warnings(self) -> tuple[str, ...]:
         """Warnings about the paths, with the vehicle's name where the Mission File names its vehicles."""
         of_all = () if self.assignment is None else self.assignment.warnings
-        return of_all + tuple(plan.member.told(text) for plan in self.vehicles for text in plan.warnings)
+        return of_all + tuple(plan.member.with_name(text) for plan in self.vehicles for text in plan.warnings)
 
 
 def members(mission: Mission, locate: Locate) -> tuple[Member, ...]:

@@ -16,7 +16,7 @@ from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import INTROSPECTION, MAX_REQUEST_BYTES, Endpoint, any_layer_key, layer_key
-from oxbow.errors import ErrorReply, Infeasible, Internal, InvalidMission, OxbowError, described
+from oxbow.errors import ErrorReply, Infeasible, Internal, InvalidMission, OxbowError, error_text
 from oxbow.stage.local import Handler
 from oxbow.stage.wire import Described, Done, Failed, FromWorker, Job, Shown
 from oxbow.stage.worker import needs_memory
@@ -90,7 +90,7 @@ class _Adapter:
             _log.error("%s: request %s needs more than %d MB", self.endpoint.stage, request_id, self.memory_mb)
             return needs_memory(self.memory_mb, self.endpoint.stage)
         _log.error("%s: request %s failed", self.endpoint.stage, request_id, exc_info=error)
-        return Internal(f"{described(error)} (request {request_id})", where=self.endpoint.stage)
+        return Internal(f"{error_text(error)} (request {request_id})", where=self.endpoint.stage)
 
     def _encoded(self, reply: Any) -> bytes:
         endpoint = self.endpoint

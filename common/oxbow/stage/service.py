@@ -25,7 +25,7 @@ from oxbow.errors import (
     InvalidMission,
     OxbowError,
     Unavailable,
-    described,
+    error_text,
 )
 from oxbow.stage.answered import Answered, digest, require_same
 from oxbow.stage.wire import Described, Done, Failed, Job, Shown
@@ -147,7 +147,7 @@ class Stage:
             answer = Failed(request_id=exchange.envelope.request_id, error=ErrorReply.of(error))
         except BaseException as error:  # noqa: BLE001 - becomes an `internal` reply
             _log.exception("request %s", exchange.envelope.request_id)
-            answer = self._fault(exchange, described(error))
+            answer = self._fault(exchange, error_text(error))
         finally:
             self._settle(exchange, answer, time.monotonic() - started)
         # Now, so that the next request need not wait for a new process.

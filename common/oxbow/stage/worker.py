@@ -21,7 +21,7 @@ __all__ = [
     "DEFAULT_MEMORY_MB",
     "Worker",
     "WorkerLost",
-    "ended",
+    "ending_text",
     "is_want_of_memory",
     "needs_memory",
     "one_threaded",
@@ -205,7 +205,7 @@ class Worker:
             self._kill()
         if is_want_of_memory(status, watch.data_bytes, self.memory_mb):
             return needs_memory(self.memory_mb, self.handler)
-        return WorkerLost(f"worker process {self.pid} {ended(status)}", where=self.handler)
+        return WorkerLost(f"worker process {self.pid} {ending_text(status)}", where=self.handler)
 
     def _kill(self) -> None:
         self._pipe.close()
@@ -254,7 +254,7 @@ def is_want_of_memory(status: int, data_bytes: int, memory_mb: int) -> bool:
     return status in _FAULTS and data_bytes > _FULL_SHARE * memory_mb * 2**20
 
 
-def ended(status: int) -> str:
+def ending_text(status: int) -> str:
     """How a process ended."""
     return f"ended by {_signal_name(-status)}" if status < 0 else f"ended with status {status}"
 

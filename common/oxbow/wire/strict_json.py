@@ -12,7 +12,7 @@ from msgspec import inspect
 
 from oxbow.errors import InvalidMission
 
-__all__ = ["decode_json", "document_of", "gathered", "gathered_part", "json_names", "utf8"]
+__all__ = ["decode_json", "document_of", "json_names", "part_with_extra", "utf8", "with_extra"]
 
 T = TypeVar("T")
 
@@ -114,7 +114,7 @@ def _decoded(data: bytes, kind: type[T], name: str, at: str) -> T:
         raise _mistyped(str(error), data, kind, name, at) from error
 
 
-def gathered(document: dict[str, msgspec.Raw], known: frozenset[str]) -> dict[str, msgspec.Raw]:
+def with_extra(document: dict[str, msgspec.Raw], known: frozenset[str]) -> dict[str, msgspec.Raw]:
     """The known fields of a JSON object, without those that are null, and all others together under `extra`.
 
     Parameters
@@ -134,7 +134,7 @@ def gathered(document: dict[str, msgspec.Raw], known: frozenset[str]) -> dict[st
     return fields | {EXTRA: msgspec.Raw(msgspec.json.encode(extra))}
 
 
-def gathered_part(data: bytes, kind: type[msgspec.Struct], name: str, *, is_list: bool = False) -> msgspec.Raw:
+def part_with_extra(data: bytes, kind: type[msgspec.Struct], name: str, *, is_list: bool = False) -> msgspec.Raw:
     """The JSON of an object, or of a list of objects, for a struct that keeps unknown fields in its `extra`.
 
     Anything else is returned as it is, and refused when it is decoded.
@@ -165,8 +165,8 @@ def gathered_part(data: bytes, kind: type[msgspec.Struct], name: str, *, is_list
     known = frozenset(json_names(kind).values())
     if is_list:
         objects = decode_json(data, list[dict[str, msgspec.Raw]], name, at=name)
-        return msgspec.Raw(msgspec.json.encode([gathered(each, known) for each in objects]))
-    return msgspec.Raw(msgspec.json.encode(gathered(decode_json(data, dict[str, msgspec.Raw], name), known)))
+        return msgspec.Raw(msgspec.json.encode([with_extra(each, known) for each in objects]))
+    return msgspec.Raw(msgspec.json.encode(with_extra(decode_json(data, dict[str, msgspec.Raw], name), known)))
 
 
 def document_of(value: msgspec.Struct) -> dict[str, Any]:

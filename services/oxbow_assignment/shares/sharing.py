@@ -30,7 +30,7 @@ from oxbow_assignment.shares.partition import (
 )
 from oxbow_assignment.shares.reach import Reach
 
-__all__ = ["Sharing", "shared"]
+__all__ = ["Sharing", "share_water"]
 
 TRIANGLES = 400
 """Approximate number of triangles per share, where the footprint is not given."""
@@ -76,7 +76,7 @@ class Sharing:
     partition: Partition | None = None
 
 
-def shared(
+def share_water(
     free: Polygon, masters: Sequence[Vehicle], footprint_m: float | None = None, water: Polygon | None = None
 ) -> Sharing:
     """Share the free space in proportion to what each master can cover: the range that its ways leave.

@@ -16,14 +16,14 @@ from oxbow.arrays import Indices
 from oxbow.errors import InvalidMission
 from oxbow_assignment.targets.assignment import TargetAssignment, assignment_of
 from oxbow_assignment.targets.clustering import Clusters, cluster_by_radius, fuzzy_c_means, k_means
-from oxbow_assignment.targets.exchange import exchanged
-from oxbow_assignment.targets.insertion import inserted, traded, trimmed
+from oxbow_assignment.targets.exchange import with_exchanges
+from oxbow_assignment.targets.insertion import trimmed_path, with_insertions, with_trades
 from oxbow_assignment.targets.matching import match
 from oxbow_assignment.targets.ordering import EXACT_MOST, best_path, exact_path
 from oxbow_assignment.targets.problem import COST, Problem
 from oxbow_assignment.targets.pseudo_coordinates import PseudoCoordinates, pseudo_coordinates
 
-__all__ = ["ClusterMethod", "Clustered", "Clustering", "assign", "cluster_paths", "mended"]
+__all__ = ["ClusterMethod", "Clustered", "Clustering", "assign", "cluster_paths", "mended_paths"]
 
 STARTS = 3
 """Starts of k-means: three leave two thirds of the gap of one to the joint optimiser, five hardly less."""
@@ -140,7 +140,7 @@ def _by_clusters(
     owners = match(problem, clusters, targets)
     paths = cluster_paths(problem, targets, clusters, owners)
     # Mended before starts are compared: a clustering is as good as what can be made of it.
-    assignment = assignment_of(problem, mended(problem, paths, [0] * len(paths)))
+    assignment = assignment_of(problem, mended_paths(problem, paths, [0] * len(paths)))
     return Clustered(assignment, targets, clusters, owners, coordinates.stress)
 
 
@@ -165,7 +165,7 @@ def cluster_paths(problem: Problem, targets: Indices, clusters: Clusters, owners
     """
     own = owners[clusters.labels]
     return [
-        trimmed(
+        trimmed_path(
             problem,
             vehicle,
             best_path(problem.figures[COST, vehicle], problem.path(vehicle, targets[own == vehicle])),
@@ -174,7 +174,7 @@ def cluster_paths(problem: Problem, targets: Indices, clusters: Clusters, owners
     ]
 
 
-def mended(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
+def mended_paths(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
     """Paths after insertions, exchanges and trades, which alternate until nothing more is gained.
 
     Parameters
@@ -192,9 +192,9 @@ def mended(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> l
         One path per vehicle, within its range; its held targets come first, as they were.
     """
     while True:
-        paths = exchanged(problem, inserted(problem, paths, held), held)
-        traded_paths = traded(problem, paths, held)
-        # By identity: `traded` returns the same array for a path that it leaves alone.
+        paths = with_exchanges(problem, with_insertions(problem, paths, held), held)
+        traded_paths = with_trades(problem, paths, held)
+        # By identity: `with_trades` returns the same array for a path that it leaves alone.
         if all(path is before for path, before in zip(traded_paths, paths, strict=True)):
             return [_exact(problem, vehicle, path, held[vehicle]) for vehicle, path in enumerate(paths)]
         paths = traded_paths

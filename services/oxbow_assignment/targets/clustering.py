@@ -16,7 +16,7 @@ from oxbow.arrays import FloatArray, Indices
 from oxbow.errors import InvalidMission
 from oxbow_assignment.targets.pseudo_coordinates import PseudoCoordinates
 
-__all__ = ["Clusters", "cluster_by_radius", "faded", "fuzzy_c_means", "k_means", "mean_distances"]
+__all__ = ["Clusters", "cluster_by_radius", "fading_weights", "fuzzy_c_means", "k_means", "mean_distances"]
 
 TURNS = 100
 """The most iterations; k-means converges long before."""
@@ -51,7 +51,7 @@ class Clusters:
         return len(self.centres)
 
 
-def faded(since_visit_s: FloatArray, fade_s: float) -> FloatArray:
+def fading_weights(since_visit_s: FloatArray, fade_s: float) -> FloatArray:
     """Weights of targets: 1 before a visit, then smoothly down to 0 in `fade_s` seconds.
 
     The report asks for a weight in [0, 1] that decreases smoothly from one to zero after the visit, and gives no
@@ -98,7 +98,7 @@ def k_means(
     k
         The number of clusters, at most the number of targets.
     weights : ndarray of shape (n,)
-        Between 0 and 1, by default 1; see `faded`.
+        Between 0 and 1, by default 1; see `fading_weights`.
     centres : ndarray of shape (k, d)
         Where to start; by default chosen by k-means++ (D. Arthur and S. Vassilvitskii, 2007).
     seed
@@ -141,7 +141,7 @@ def fuzzy_c_means(
     k
         The number of clusters, at most the number of targets.
     weights : ndarray of shape (n,)
-        Between 0 and 1, by default 1; see `faded`.
+        Between 0 and 1, by default 1; see `fading_weights`.
     seed
         Seed of the k-means that comes first.
 

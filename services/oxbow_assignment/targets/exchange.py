@@ -18,13 +18,13 @@ from oxbow_assignment.targets.layout import Layout
 from oxbow_assignment.targets.ordering import LEAST_GAIN, SEGMENT, improved_path
 from oxbow_assignment.targets.problem import COST, Problem
 
-__all__ = ["exchanged", "in_order"]
+__all__ = ["in_order", "with_exchanges"]
 
 NEAR = 10
 """How many near targets of each target are considered."""
 
 
-def exchanged(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
+def with_exchanges(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
     """Paths between which no move lowers the objective, each within its vehicle's range.
 
     Parameters

@@ -11,7 +11,7 @@ from oxbow.arrays import FloatArray, Indices
 from oxbow_assignment.targets.assignment import tour_figures, tour_length
 from oxbow_assignment.targets.problem import COST, LENGTH, SUM_ROUNDING, Problem
 
-__all__ = ["inserted", "traded", "trimmed"]
+__all__ = ["trimmed_path", "with_insertions", "with_trades"]
 
 VALUE_ROUNDING = 1e-9
 """Differences of value below this are rounding."""
@@ -23,7 +23,7 @@ LEAST_SAVED_S = 1e-6
 """Savings below this are rounding."""
 
 
-def trimmed(
+def trimmed_path(
     problem: Problem, vehicle: int, path: Indices, *, held: int = 0, wanted: np.intp | None = None
 ) -> Indices:
     """A path within its vehicle's range, of targets that it may visit.
@@ -63,7 +63,7 @@ def trimmed(
     return path
 
 
-def inserted(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
+def with_insertions(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
     """The paths with every target inserted that fits, in each step the one that costs least for its value.
 
     Parameters
@@ -96,7 +96,7 @@ def inserted(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) ->
     return paths
 
 
-def traded(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
+def with_trades(problem: Problem, paths: Sequence[Indices], held: Sequence[int]) -> list[Indices]:
     """The paths with unserved targets in place of others, where that is worth it.
 
     A target is inserted although it does not fit, and others are trimmed. The change is kept if the path then
@@ -146,7 +146,7 @@ def _trade(problem: Problem, vehicle: int, path: Indices, held: int, target: np.
     costs = problem.figures[COST, vehicle]
     detours = costs[before, target] + costs[target, after] - costs[before, after]
     longer = np.insert(path, held + 1 + int(detours.argmin()), target)
-    traded = trimmed(problem, vehicle, longer, held=held, wanted=target)
+    traded = trimmed_path(problem, vehicle, longer, held=held, wanted=target)
     added_m = float((tour_figures(problem, vehicle, traded) - tour_figures(problem, vehicle, path))[COST])
     value = problem.values[traded[1:-1]].sum() - problem.values[path[1:-1]].sum()
     return _Trade(vehicle, traded, float(value), added_m / problem.vehicles[vehicle].speed_mps)

@@ -121,15 +121,15 @@ def optimise(problem: Problem, *, patience: int = PATIENCE, seed: int = 0) -> Ta
     """
     if not is_available():
         raise Unavailable(MISSING, where="joint")
-    from oxbow_assignment.targets.pyvrp_solver import solved  # noqa: PLC0415 (an optional dependency)
+    from oxbow_assignment.targets.pyvrp_solver import solve_with_pyvrp  # noqa: PLC0415 (an optional dependency)
 
-    best = assignment_of(problem, solved(problem, patience=patience, seed=seed))
+    best = assignment_of(problem, solve_with_pyvrp(problem, patience=patience, seed=seed))
     if problem.objective is Objective.TOTAL:
         return best
     missed_s = 0.0
     while best.cost_s - missed_s > PRECISION * best.cost_s:
         within_s = (best.cost_s + missed_s) / 2
-        found = assignment_of(problem, solved(problem, patience=patience, seed=seed, within_s=within_s))
+        found = assignment_of(problem, solve_with_pyvrp(problem, patience=patience, seed=seed, within_s=within_s))
         # A makespan counts as reached only if the same value is served: by leaving targets, any can be.
         if found.value == best.value and found.cost_s < best.cost_s:
             best = found

@@ -14,7 +14,7 @@ from pyvrp.stop import NoImprovement
 from oxbow.arrays import FloatArray, Indices
 from oxbow_assignment.targets.problem import COST, LENGTH, Problem
 
-__all__ = ["solved"]
+__all__ = ["solve_with_pyvrp"]
 
 PER_UNIT = 100
 """PyVRP's units per metre, and per second."""
@@ -23,7 +23,9 @@ PRIZE = 2.0
 """The least value weighs this many times the duration of all ranges together, so that value comes first."""
 
 
-def solved(problem: Problem, *, patience: int, seed: int, within_s: float | None = None) -> list[Indices]:
+def solve_with_pyvrp(
+    problem: Problem, *, patience: int, seed: int, within_s: float | None = None
+) -> list[Indices]:
     """Paths of least total duration, one per vehicle, among those that serve the greatest value.
 
     Parameters

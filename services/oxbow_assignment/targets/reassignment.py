@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 from oxbow.arrays import Indices
 from oxbow.errors import InvalidMission
-from oxbow_assignment.targets.assign import mended
+from oxbow_assignment.targets.assign import mended_paths
 from oxbow_assignment.targets.assignment import TargetAssignment, assignment_of
-from oxbow_assignment.targets.insertion import trimmed
+from oxbow_assignment.targets.insertion import trimmed_path
 from oxbow_assignment.targets.problem import Problem
 
 __all__ = ["Reassignment", "reassign"]
@@ -72,7 +72,9 @@ def reassign(problem: Problem, tours: Sequence[Sequence[int]], *, hysteresis_s: 
     if not hysteresis_s >= 0.0:
         raise InvalidMission(f"is {hysteresis_s!r} s; expected a number >= 0", where="hysteresis_s")
     _require_tours(problem, tours)
-    paths = [trimmed(problem, vehicle, problem.path(vehicle, tour), held=1) for vehicle, tour in enumerate(tours)]
+    paths = [
+        trimmed_path(problem, vehicle, problem.path(vehicle, tour), held=1) for vehicle, tour in enumerate(tours)
+    ]
     current = tuple(
         tour[0] if len(tour) and _first(path) == tour[0] else None for path, tour in zip(paths, tours, strict=True)
     )
@@ -110,7 +112,7 @@ class _Candidate:
         bound: frozenset[int],
         current: Sequence[int | None],
     ) -> _Candidate:
-        paths = mended(problem, paths, [int(vehicle in bound) for vehicle in range(len(paths))])
+        paths = mended_paths(problem, paths, [int(vehicle in bound) for vehicle in range(len(paths))])
         changed = tuple(
             vehicle
             for vehicle, (path, target) in enumerate(zip(paths, current, strict=True))

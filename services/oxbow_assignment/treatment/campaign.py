@@ -11,9 +11,9 @@ from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import HotSpot, LeftSpot, Vehicle
 from oxbow.geometry.route import NO_DANGER, Danger, RouteMethod, make_router
-from oxbow_assignment.treatment.division import Division, divided
+from oxbow_assignment.treatment.division import Division, divide_treatments
 from oxbow_assignment.treatment.fleet import Fleet
-from oxbow_assignment.treatment.sorties import Journey, Schedule, scheduled
+from oxbow_assignment.treatment.sorties import Journey, Schedule, schedule_sorties
 from oxbow_assignment.treatment.spots import require_treatable, waters
 from oxbow_assignment.treatment.treatment import Treatment, treatment_of
 
@@ -141,14 +141,14 @@ def plan_campaign(
         for spot, water in zip(spots, found, strict=True)
         if not water.is_empty
     )
-    division = divided(treatments, fleet)
+    division = divide_treatments(treatments, fleet)
     left = [*_dry(spots, found, free), *_out_of_reach(treatments, division, fleet)]
     return Campaign(
         waters=found,
         fleet=fleet,
         treatments=treatments,
         division=division,
-        schedule=scheduled(division.parts, fleet, seed=seed),
+        schedule=schedule_sorties(division.parts, fleet, seed=seed),
         left=tuple(sorted(left, key=lambda spot: -spot.value_per_m)),
     )
 

@@ -15,7 +15,7 @@ from oxbow.errors import Infeasible
 from oxbow_assignment.treatment.fleet import Fleet
 from oxbow_assignment.treatment.treatment import Treatment
 
-__all__ = ["Division", "OutOfReach", "Part", "divided"]
+__all__ = ["Division", "OutOfReach", "Part", "divide_treatments"]
 
 LEAST_SPARE = 0.125
 """The shortest parts of one division, as a fraction of the range; far from the docks, they are divided further."""
@@ -80,7 +80,7 @@ class Division:
     out_of_reach: tuple[OutOfReach, ...]
 
 
-def divided(treatments: Sequence[Treatment], fleet: Fleet) -> Division:
+def divide_treatments(treatments: Sequence[Treatment], fleet: Fleet) -> Division:
     """Divide treatments into parts that fit the range of a slave, as few as possible.
 
     A part fits if its length and the way to it and home are within range, on average over both directions. One

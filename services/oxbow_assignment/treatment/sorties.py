@@ -18,9 +18,9 @@ from oxbow_assignment.targets.joint import JointSolution, solve
 from oxbow_assignment.targets.problem import COST, LENGTH, Objective, Problem
 from oxbow_assignment.treatment.division import Part
 from oxbow_assignment.treatment.fleet import Fleet, FleetWays
-from oxbow_assignment.treatment.lines import joined
+from oxbow_assignment.treatment.lines import chained_line
 
-__all__ = ["Journey", "Schedule", "scheduled"]
+__all__ = ["Journey", "Schedule", "schedule_sorties"]
 
 JOINT_MOST = 30
 """The joint optimiser is not run on more parts than this: it would take longer than everything else."""
@@ -67,7 +67,7 @@ class Schedule:
     first: JointSolution | None
 
 
-def scheduled(parts: Sequence[Part], fleet: Fleet, *, seed: int = 0) -> Schedule:
+def schedule_sorties(parts: Sequence[Part], fleet: Fleet, *, seed: int = 0) -> Schedule:
     """Assign parts to slaves, round after round, so that each round treats as much value as it can.
 
     A part is a target whose two ends are apart. Between parts, the problem counts the mean of the ways from either
@@ -155,7 +155,7 @@ def _journey(slave: int, tour: Indices, parts: Sequence[Part], fleet: Fleet, way
         ways.home(slave, enters[-1] ^ 1),
     ]
     travelled = [stops[0], *(line for pair in zip(routes, stops[1:], strict=True) for line in pair)]
-    path = joined(travelled)
+    path = chained_line(travelled)
     _require_conforming(path, fleet, slave)
     return Journey(slave, tuple(tour.tolist()), path, tuple(routes))
 

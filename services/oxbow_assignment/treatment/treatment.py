@@ -17,7 +17,7 @@ from oxbow.contracts import HotSpot
 from oxbow.errors import InvalidMission
 from oxbow.geometry.route import Router
 from oxbow_assignment.targets.ordering import improved_path
-from oxbow_assignment.treatment.lines import joined
+from oxbow_assignment.treatment.lines import chained_line
 from oxbow_assignment.treatment.passes import chord, parallel_passes, passes_needed
 
 __all__ = ["COVERED", "Treatment", "treatment_of"]
@@ -93,8 +93,8 @@ def treatment_of(spot: HotSpot, water: BaseGeometry, free: Polygon, router: Rout
     _require_few(len(more), spot, swath_m)
     passes: list[LineString] = []
     for _ in range(ROUNDS):
-        passes = ordered([*passes, *more], free)
-        line = linked(passes, free, router)
+        passes = ordered_passes([*passes, *more], free)
+        line = linked_passes(passes, free, router)
         more = _further_passes(line.buffer(swath_m / 2), water, free, swath_m)
         if not more:
             break
@@ -120,7 +120,7 @@ def _further_passes(treated: BaseGeometry, water: BaseGeometry, free: Polygon, s
     return [line for piece in pieces for line in chord(piece, free, swath_m)]
 
 
-def ordered(passes: Sequence[LineString], free: Polygon) -> list[LineString]:
+def ordered_passes(passes: Sequence[LineString], free: Polygon) -> list[LineString]:
     """The passes in an order, and each in a direction, that makes the ways between them short.
 
     The order goes from each pass to the nearest next one, which runs back and forth over parallel passes; then
@@ -146,7 +146,7 @@ def ordered(passes: Sequence[LineString], free: Polygon) -> list[LineString]:
     return [_directed(passes[row // 2], backwards=bool(row % 2)) for row in rows[::2].tolist()]
 
 
-def linked(passes: Sequence[LineString], free: Polygon, router: Router) -> LineString:
+def linked_passes(passes: Sequence[LineString], free: Polygon, router: Router) -> LineString:
     """One line along all passes, straight from one to the next where that stays inside, or else along a route.
 
     Parameters
@@ -169,7 +169,7 @@ def linked(passes: Sequence[LineString], free: Polygon, router: Router) -> LineS
         if not free.covers(way):
             parts.append(router.route(*way.coords).line)
         parts.append(after)
-    return joined(parts)
+    return chained_line(parts)
 
 
 def _distances(ends: FloatArray, free: Polygon) -> FloatArray:

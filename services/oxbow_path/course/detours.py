@@ -22,7 +22,7 @@ from oxbow_path.walk.region import largest
 from oxbow_path.walk.stretch import stretch
 from oxbow_path.walk.trial import Waters
 
-__all__ = ["detoured", "with_detours"]
+__all__ = ["with_detour", "with_detours"]
 
 HALF_WIDTH = 0.12
 """Half width of a detour at first, in spacings: narrow, so that it parts the water that it runs into."""
@@ -120,7 +120,7 @@ class _Ways:
         return routes.into(self._path, routes.goals_near(self._path, HALF_WIDTH * self.waters.spacing_m))
 
 
-def detoured(path: LineString, waters: Waters, gap: FloatArray, left_m: float) -> LineString | None:
+def with_detour(path: LineString, waters: Waters, gap: FloatArray, left_m: float) -> LineString | None:
     """The path with one detour all the way to a place; None where none fits.
 
     Parameters

@@ -14,12 +14,12 @@ from oxbow.contracts import SpacingStep
 from oxbow.errors import Infeasible, Internal
 from oxbow.geometry.route import RouteMethod, make_router
 from oxbow.tolerances import ROUNDING_M
-from oxbow_path.course.detours import detoured, with_detours
+from oxbow_path.course.detours import with_detour, with_detours
 from oxbow_path.course.loops import Middles
-from oxbow_path.improvement import improved
+from oxbow_path.improvement import improved_line
 from oxbow_path.refinement import Polyline
 from oxbow_path.task import Display, MethodPlan, PathMethod, Task
-from oxbow_path.walk.legs import joined
+from oxbow_path.walk.legs import path_with_legs
 from oxbow_path.walk.pattern import try_transects
 from oxbow_path.walk.trial import CUT, Pattern
 
@@ -113,7 +113,9 @@ def _spent(plan: MethodPlan, task: Task, display: Display) -> MethodPlan:
     path = with_detours(plan.path, task.waters, task.budget.most_m, reach_m=FAR * task.spacing_m)
     if path.length == plan.path.length or task.stop():
         return replace(plan, path=path)
-    return replace(plan, path=improved(Polyline.of(path, task.waters.passable.free_and_rounding), task, display))
+    return replace(
+        plan, path=improved_line(Polyline.of(path, task.waters.passable.free_and_rounding), task, display)
+    )
 
 
 def _is_narrow(task: Task) -> bool:
@@ -155,7 +157,7 @@ def _along(courses: Sequence[LineString], task: Task, display: Display) -> Metho
     ]
     best = min(longer, key=lambda course: _score_m(course, task))
     display.lines("course", [best])
-    path = improved(Polyline.of(best, waters.passable.free_and_rounding), task, display)
+    path = improved_line(Polyline.of(best, waters.passable.free_and_rounding), task, display)
     steps = (SpacingStep(spacing_m=task.spacing_m, length_m=best.length),)
     return MethodPlan(path, task.spacing_m, task.spacing_m, steps)
 
@@ -209,12 +211,12 @@ def _from_home(loop: LineString, task: Task) -> LineString | None:
         away = loop.project(home) + loop.length / 2
         # Begun at its far side: a detour leaves the ends of a path where they are.
         turned = _turned(loop, away % loop.length)
-        found = detoured(turned, waters, shapely.get_coordinates(home)[0], task.budget.most_m - loop.length)
+        found = with_detour(turned, waters, shapely.get_coordinates(home)[0], task.budget.most_m - loop.length)
         if found is None:
             return None
         loop = found
     try:
-        return joined(
+        return path_with_legs(
             Polygon(loop),
             waters.launch,
             waters.recovery,

@@ -2,9 +2,9 @@
 
 from oxbow_path.refinement.guard import Guard
 from oxbow_path.refinement.polyline import Polyline
-from oxbow_path.refinement.refine import NODE_WORK, RefinementStep, Stop, refined
+from oxbow_path.refinement.refine import NODE_WORK, RefinementStep, Stop, refined_path
 from oxbow_path.refinement.samples import Samples, weights_at
-from oxbow_path.refinement.smoothing import smoothed
+from oxbow_path.refinement.smoothing import smoothed_path
 
 __all__ = [
     "NODE_WORK",
@@ -13,7 +13,7 @@ __all__ = [
     "RefinementStep",
     "Samples",
     "Stop",
-    "refined",
-    "smoothed",
+    "refined_path",
+    "smoothed_path",
     "weights_at",
 ]

@@ -15,7 +15,7 @@ from oxbow_path.refinement.polyline import Polyline
 from oxbow_path.refinement.pull import Pull, feet
 from oxbow_path.refinement.samples import Samples
 
-__all__ = ["NODE_WORK", "RefinementStep", "Stop", "refined"]
+__all__ = ["NODE_WORK", "RefinementStep", "Stop", "refined_path"]
 
 Stop = Callable[[], bool]
 """Asked before each step whether time is up."""
@@ -71,7 +71,7 @@ class RefinementStep:
         return self.largest_m + self.p95_m
 
 
-def refined(
+def refined_path(
     path: Polyline,
     free: Polygon,
     samples: Samples,

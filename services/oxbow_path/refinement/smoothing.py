@@ -10,7 +10,7 @@ from oxbow.arrays import FloatArray
 from oxbow_path.refinement.guard import Guard
 from oxbow_path.refinement.polyline import Polyline
 
-__all__ = ["smoothed"]
+__all__ = ["smoothed_path"]
 
 CONTROL_PITCH = 0.2
 """Distance of the spline's control points at most, in spacings: the size of the corners' roundings."""
@@ -22,7 +22,7 @@ DETAIL = 0.005
 """Waypoints that move the path by less than this, in spacings, are left out."""
 
 
-def smoothed(path: Polyline, free: Polygon, spacing_m: float) -> LineString:
+def smoothed_path(path: Polyline, free: Polygon, spacing_m: float) -> LineString:
     """Round a path's corners.
 
     The waypoints, with more between them where they are far apart, are the control points of a uniform cubic

@@ -13,7 +13,7 @@ from oxbow.arrays import FloatArray
 from oxbow_path.refinement.guard import Guard
 from oxbow_path.refinement.polyline import Polyline
 
-__all__ = ["NODES_PER_SPACING", "Epoch", "UpdateSchedule", "organised"]
+__all__ = ["NODES_PER_SPACING", "Epoch", "UpdateSchedule", "organised_curve"]
 
 NODES_PER_SPACING = 1.8
 """Nodes of the first ring, per spacing of the longest path."""
@@ -53,7 +53,7 @@ class Epoch:
     width: float
 
 
-def organised(
+def organised_curve(
     ring: Polyline,
     draws: FloatArray,
     weights: FloatArray,

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from oxbow.contracts import SpacingStep
-from oxbow_path.improvement import improved
+from oxbow_path.improvement import improved_line
 from oxbow_path.refinement import NODE_WORK, Guard, Polyline, weights_at
 from oxbow_path.space_filling_curve.draws import drawn_places
-from oxbow_path.space_filling_curve.kohonen import NODES_PER_SPACING, Epoch, UpdateSchedule, organised
+from oxbow_path.space_filling_curve.kohonen import NODES_PER_SPACING, Epoch, UpdateSchedule, organised_curve
 from oxbow_path.task import SHOWN_EVERY, Display, MethodPlan, Task
 from oxbow_path.walk.pattern import try_transects
 from oxbow_path.walk.remainder import with_remainder
@@ -72,10 +72,10 @@ def space_filling_curve(task: Task, display: Display) -> MethodPlan:
         display.figures("epochs", figures, step=number)
         if number % SHOWN_EVERY == 0:
             display.lines("ring", [ring.line], step=number, labels=(f"epoch {number}",))
-    path = improved(ring, task, display)
+    path = improved_line(ring, task, display)
     # A ring that grew too long may not shorten enough under the guard; the walk it began from fits.
     if not task.budget.fits(path.length):
-        path = improved(Polyline.of(start.path, task.waters.passable.free_and_rounding), task, display)
+        path = improved_line(Polyline.of(start.path, task.waters.passable.free_and_rounding), task, display)
     steps.append(SpacingStep(spacing_m=task.spacing_m, length_m=path.length))
     return MethodPlan(path, task.spacing_m, REACH_NAMED * task.spacing_m / 2, tuple(steps))
 
@@ -95,7 +95,7 @@ def _epochs(ring: Polyline, task: Task) -> Iterator[Epoch]:
     count = len(task.samples)
     work = count + NODE_WORK * NODES_PER_SPACING * task.useful_length_m / task.spacing_m
     draws = drawn_places(task.waters.cells, count, seed=request.seed, draw=request.draw)
-    return organised(
+    return organised_curve(
         ring,
         draws,
         # Squared: a place of weight w is to be w times as near, which takes w^2 times as many draws.

@@ -21,7 +21,7 @@ from oxbow.arrays import Indices
 from oxbow_path.tour.solver import TourSolution
 from oxbow_path.tour.start import Start
 
-__all__ = ["shortened"]
+__all__ = ["shortened_tour"]
 
 NEIGHBOURS = 8
 """How many of the nearest sites a move may join a site to."""
@@ -52,7 +52,7 @@ LEAST_GAIN = 1e-9
 Step = Callable[[int], int]
 
 
-def shortened(start: Start, *, seed: int) -> TourSolution:
+def shortened_tour(start: Start, *, seed: int) -> TourSolution:
     """Shorten a tour: a `Solver`.
 
     Parameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from shapely import Point
 
-from oxbow_path.improvement import improved, spacing_steps
+from oxbow_path.improvement import improved_line, spacing_steps
 from oxbow_path.refinement import Polyline
 from oxbow_path.task import Display, MethodPlan, Task
 from oxbow_path.tour.planner import plan_tour
@@ -42,4 +42,4 @@ def tour(task: Task, display: Display) -> MethodPlan:
     display.lines("tour", [chosen.tour.way])
     path = Polyline.of(chosen.path, task.waters.passable.free_and_rounding)
     steps = spacing_steps([trial.trial for trial in plan.trials])
-    return MethodPlan(improved(path, task, display), chosen.spacing_m, chosen.trial.pattern.reach_m, steps)
+    return MethodPlan(improved_line(path, task, display), chosen.spacing_m, chosen.trial.pattern.reach_m, steps)

@@ -21,7 +21,7 @@ from oxbow.tolerances import ROUNDING_M
 from oxbow_path.tour.slits import GRID_M, slit
 from oxbow_path.walk.region import largest
 
-__all__ = ["enclosed"]
+__all__ = ["enclosed_region"]
 
 QUAD_SEGS = 2
 """Lanes have ends of few corners: every corner is a waypoint."""
@@ -30,7 +30,7 @@ PARTING = 3
 """Where this many stretches of a tour end, it meets itself."""
 
 
-def enclosed(way: FloatArray, free: Polygon, lane_m: float) -> Polygon:
+def enclosed_region(way: FloatArray, free: Polygon, lane_m: float) -> Polygon:
     """The region that a closed way encloses, in one piece, perhaps with holes.
 
     Parameters

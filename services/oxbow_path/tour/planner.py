@@ -14,17 +14,17 @@ from shapely import LineString
 from oxbow.arrays import FloatArray, Indices
 from oxbow_path.task import Task
 from oxbow_path.tour.geodesic import Geodesics, ShoreSights
-from oxbow_path.tour.local_search import shortened
-from oxbow_path.tour.outline import enclosed
-from oxbow_path.tour.pruning import pruned
-from oxbow_path.tour.pyvrp_solver import is_installed, polished
-from oxbow_path.tour.sites import clustered, low_discrepancy, with_gaps
+from oxbow_path.tour.local_search import shortened_tour
+from oxbow_path.tour.outline import enclosed_region
+from oxbow_path.tour.pruning import pruned_order
+from oxbow_path.tour.pyvrp_solver import is_installed, polished_tour
+from oxbow_path.tour.sites import cluster_centres, low_discrepancy, with_gaps
 from oxbow_path.tour.solver import Solver, TourSolution
 from oxbow_path.tour.start import first_tour
 from oxbow_path.walk.region import Brush, Circuit, Walk, clear_of_land, simply_connected
 from oxbow_path.walk.remainder import with_remainder
 from oxbow_path.walk.spacing import TURNS, Budget, interpolated
-from oxbow_path.walk.trial import Pattern, Trial, Waters, finished, grown_to_entries
+from oxbow_path.walk.trial import Pattern, Trial, Waters, grown_to_entries, trial_with_legs
 
 __all__ = ["TourPlan", "TourTrial", "plan_tour"]
 
@@ -171,7 +171,7 @@ def _score(trial: TourTrial, waters: Waters, budget: Budget) -> float:
 
 
 def _best_solver() -> Solver:
-    return polished if is_installed() else shortened
+    return polished_tour if is_installed() else shortened_tour
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ class _Attempt:
         pattern = Pattern(tour.pitch_m)
         # The lane round the tour encloses a region; its boundary is the ring that the path travels.
         walk = simply_connected(
-            enclosed(shapely.get_coordinates(tour.way), waters.free, lane_m),
+            enclosed_region(shapely.get_coordinates(tour.way), waters.free, lane_m),
             waters.free,
             waters.probe,
             cut_width_m=2 * lane_m,
@@ -215,12 +215,12 @@ class _Attempt:
         clear = partial(clear_of_land, free=waters.free)
         region = grown_to_entries(walk.region, waters, Brush(waters.free, lane_m, 0.0), cleaned=clear)
         reached = Walk(region, walk.cuts, walk.enclosed)
-        return TourTrial(tour, finished(waters, pattern, Circuit((), ()), reached))
+        return TourTrial(tour, trial_with_legs(waters, pattern, Circuit((), ()), reached))
 
     def _sites(self, entries: FloatArray, count: int, pitch_m: float) -> FloatArray:
         if count == 0:
             return entries
-        centres = clustered(self._samples, count, self.waters.free)
+        centres = cluster_centres(self._samples, count, self.waters.free)
         return with_gaps(np.vstack([entries, centres]), self.waters.probe.points, GAP * pitch_m)
 
     def _solution(self, geodesics: Geodesics, near_m: float) -> TourSolution:
@@ -267,7 +267,7 @@ def _shortened(attempt: _Attempt, trials: Sequence[TourTrial], budget: Budget) -
     tour_m, fits = whole.tour.way.length + target_m - whole.length_m, len(too_long) < len(trials)
     tried = {len(whole.tour.order)}
     for _ in range(TURNS):
-        order = pruned(whole.tour.order, whole.tour.geodesics, kept=whole.tour.entries, length_m=tour_m)
+        order = pruned_order(whole.tour.order, whole.tour.geodesics, kept=whole.tour.entries, length_m=tour_m)
         if len(order) in tried:
             break
         tried.add(len(order))

@@ -13,13 +13,13 @@ import numpy as np
 from oxbow.arrays import FloatArray, Indices
 from oxbow_path.tour.geodesic import Geodesics
 
-__all__ = ["pruned"]
+__all__ = ["pruned_order"]
 
 LEAST_M = 1e-9
 """Sites may coincide."""
 
 
-def pruned(order: Indices, geodesics: Geodesics, *, kept: int, length_m: float) -> Indices:
+def pruned_order(order: Indices, geodesics: Geodesics, *, kept: int, length_m: float) -> Indices:
     """Leave out sites until a tour is short enough.
 
     The next to go is the one that saves most for how far from the tour its water will be, and the water of those

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from oxbow.arrays import Indices
-from oxbow_path.tour.local_search import shortened
+from oxbow_path.tour.local_search import shortened_tour
 from oxbow_path.tour.solver import TourSolution
 from oxbow_path.tour.start import Start
 
-__all__ = ["is_installed", "polished"]
+__all__ = ["is_installed", "polished_tour"]
 
 MOST_SITES = 3000
 """PyVRP keeps all distances: more sites are left as they are."""
@@ -36,7 +36,7 @@ def is_installed() -> bool:
     return find_spec("pyvrp") is not None
 
 
-def polished(start: Start, *, seed: int) -> TourSolution:
+def polished_tour(start: Start, *, seed: int) -> TourSolution:
     """Shorten a tour by the project's own search, then by PyVRP's: a `Solver`.
 
     Parameters
@@ -51,7 +51,7 @@ def polished(start: Start, *, seed: int) -> TourSolution:
     Solution
         PyVRP's tour where it is the shorter one and keeps to legs of near sites; else the project's own.
     """
-    own = shortened(start, seed=seed)
+    own = shortened_tour(start, seed=seed)
     # 3000 sites are nine million distances, some 70 MB.
     if len(own.order) > MOST_SITES:
         return own

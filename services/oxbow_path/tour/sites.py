@@ -11,7 +11,7 @@ from shapely import Polygon
 from oxbow.arrays import FloatArray
 from oxbow.geometry.triangles import spread
 
-__all__ = ["clustered", "low_discrepancy", "with_gaps"]
+__all__ = ["cluster_centres", "low_discrepancy", "with_gaps"]
 
 ROUNDS = 12
 """Rounds of Lloyd's algorithm: few, as the first points of the sequence are nearly even already."""
@@ -42,7 +42,7 @@ def low_discrepancy(free: Polygon, count: int, *, seed: int) -> FloatArray:
     return spread((qmc.Halton(2, scramble=False).random(count) + shift) % 1.0, free)
 
 
-def clustered(samples: FloatArray, count: int, free: Polygon) -> FloatArray:
+def cluster_centres(samples: FloatArray, count: int, free: Polygon) -> FloatArray:
     """The centres of `count` clusters of samples, by k-means (Lloyd 1982) started from the first samples.
 
     A centre that lies on land, between two shores, is moved to the nearest sample.

@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 import shapely
 
-from oxbow_path.improvement import improved, method_plan
+from oxbow_path.improvement import improved_line, method_plan
 from oxbow_path.refinement import Polyline
 from oxbow_path.task import Display, MethodPlan, Task
 from oxbow_path.transect.show import show_transects
 from oxbow_path.walk.pattern import try_transects
 from oxbow_path.walk.remainder import with_remainder
-from oxbow_path.walk.spacing import fitted
+from oxbow_path.walk.spacing import fit_spacing
 from oxbow_path.walk.trial import Trial
 
 __all__ = ["transects"]
@@ -48,10 +48,10 @@ def transects(task: Task, display: Display) -> MethodPlan:
     """
     waters = task.waters
     attempt = partial(try_transects, waters)
-    fit = fitted(attempt, FIRST_SPACING * task.spacing_m, task.budget, widest_m=waters.widest_m)
+    fit = fit_spacing(attempt, FIRST_SPACING * task.spacing_m, task.budget, widest_m=waters.widest_m)
     fit = replace(fit, chosen=with_remainder(fit.chosen, waters, task.budget))
     show_transects(fit, display)
-    return method_plan(improved(_polyline(fit.chosen, task), task, display), fit)
+    return method_plan(improved_line(_polyline(fit.chosen, task), task, display), fit)
 
 
 def _polyline(trial: Trial, task: Task) -> Polyline:

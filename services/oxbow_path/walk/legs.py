@@ -30,7 +30,7 @@ from oxbow_path.walk.access import BESIDE_LEG, Access
 from oxbow_path.walk.region import largest
 from oxbow_path.walk.stretch import stretch
 
-__all__ = ["Passable", "is_plainly_simple", "joined"]
+__all__ = ["Passable", "is_plainly_simple", "path_with_legs"]
 
 OTHER_DETAIL = 0.83
 """Change of the detail from one attempt to the next."""
@@ -73,7 +73,7 @@ class Passable:
         return shapely.union_all(shapely.difference(stray, self.free_and_rounding))
 
 
-def joined(
+def path_with_legs(
     region: Polygon,
     launch: Access,
     recovery: Access,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from oxbow_path.walk.circuit import plan_circuit
 from oxbow_path.walk.transects import place_transects
-from oxbow_path.walk.trial import Pattern, Trial, Waters, walked
+from oxbow_path.walk.trial import Pattern, Trial, Waters, walk_round_tree
 
 __all__ = ["try_transects"]
 
@@ -41,4 +41,4 @@ def try_transects(waters: Waters, pattern: Pattern) -> Trial:
         trim_m=pattern.trim_m,
         inset_m=pattern.half_width_m + pattern.trim_m,
     )
-    return walked(waters, pattern, circuit)
+    return walk_round_tree(waters, pattern, circuit)

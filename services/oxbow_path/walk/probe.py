@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from oxbow.arrays import FloatArray, Indices
 from oxbow.geometry.lattice import lattice_within
 
-__all__ = ["Probe", "covered"]
+__all__ = ["Probe", "all_within_reach"]
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Probe:
         return np.asarray(distance)
 
 
-def covered(points: FloatArray, steps: FloatArray, reach_m: float) -> bool:
+def all_within_reach(points: FloatArray, steps: FloatArray, reach_m: float) -> bool:
     """Whether every point has a step within reach.
 
     Parameters

@@ -17,9 +17,9 @@ from shapely import LinearRing, LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import FloatArray, Indices
-from oxbow_path.walk.probe import Probe, covered
+from oxbow_path.walk.probe import Probe, all_within_reach
 
-__all__ = ["Brush", "Circuit", "Walk", "clear_of_land", "dilated", "largest", "simply_connected"]
+__all__ = ["Brush", "Circuit", "Walk", "clear_of_land", "dilated_circuit", "largest", "simply_connected"]
 
 CORE = 0.5
 """Half width of a band in narrows, as a share of its half width in the open."""
@@ -130,7 +130,7 @@ def _dilations(lines: Sequence[LineString], width_m: float, *, flat: bool) -> li
     return list(dilations)
 
 
-def dilated(circuit: Circuit, brush: Brush) -> Polygon:
+def dilated_circuit(circuit: Circuit, brush: Brush) -> Polygon:
     """The circuit's lines, dilated: transects end where they end, links reach over what they join.
 
     Parameters
@@ -217,7 +217,7 @@ def _enclose(region: Polygon, probe: Probe, reach_m: float) -> tuple[list[Linear
         # A place to cover lies within reach of the hole, and the step that covers it within reach of the place.
         near = _near(steps, holes[index], 2 * reach_m)
         rest = near[(owner[near] != index) & kept[owner[near]]]
-        kept[index] = not covered(served, steps[rest], reach_m)
+        kept[index] = not all_within_reach(served, steps[rest], reach_m)
     return (
         [ring for ring, keep in zip(rings[1:], kept[1:], strict=True) if keep],
         [hole for hole, keep in zip(holes[1:], kept[1:], strict=True) if not keep],

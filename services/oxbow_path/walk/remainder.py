@@ -16,7 +16,7 @@ from oxbow.tolerances import ROUNDING_M
 from oxbow_path.walk.gaps import branch_to
 from oxbow_path.walk.region import Brush, Walk, largest, simply_connected
 from oxbow_path.walk.spacing import Budget
-from oxbow_path.walk.trial import Trial, Waters, finished, touches_entries
+from oxbow_path.walk.trial import Trial, Waters, touches_entries, trial_with_legs
 
 __all__ = ["with_remainder"]
 
@@ -115,7 +115,9 @@ def _grown(trial: Trial, waters: Waters, spur: LineString) -> Trial | None:
     )
     if not touches_entries(walk.region, waters):
         return None
-    return finished(waters, trial.pattern, trial.circuit, Walk(walk.region, trial.walk.cuts, trial.walk.enclosed))
+    return trial_with_legs(
+        waters, trial.pattern, trial.circuit, Walk(walk.region, trial.walk.cuts, trial.walk.enclosed)
+    )
 
 
 def _keeps_clear(path: LineString) -> bool:

@@ -11,7 +11,7 @@ from oxbow.contracts.budget import LENGTH_RESERVE, too_short
 from oxbow.errors import Infeasible
 from oxbow_path.walk.trial import Pattern, Trial
 
-__all__ = ["TURNS", "Budget", "Fit", "fitted", "interpolated"]
+__all__ = ["TURNS", "Budget", "Fit", "fit_spacing", "interpolated"]
 
 ENOUGH = 0.97
 """Share of the longest length that a path should use."""
@@ -73,7 +73,7 @@ class Fit:
     trials: tuple[Trial, ...]
 
 
-def fitted(
+def fit_spacing(
     attempt: Callable[[Pattern], Trial], first_spacing_m: float, budget: Budget, *, widest_m: float = math.inf
 ) -> Fit:
     """Try spacings until one uses the length well.

@@ -16,11 +16,19 @@ from oxbow.geometry.route.gate_routes import Routes
 from oxbow.tolerances import ROUNDING_M
 from oxbow_path.walk.access import Access
 from oxbow_path.walk.gaps import branch_to, reach_gaps
-from oxbow_path.walk.legs import Passable, is_plainly_simple, joined
+from oxbow_path.walk.legs import Passable, is_plainly_simple, path_with_legs
 from oxbow_path.walk.probe import Probe
-from oxbow_path.walk.region import Brush, Circuit, Walk, clear_of_land, dilated, largest, simply_connected
+from oxbow_path.walk.region import Brush, Circuit, Walk, clear_of_land, dilated_circuit, largest, simply_connected
 
-__all__ = ["Pattern", "Trial", "Waters", "finished", "grown_to_entries", "touches_entries", "walked"]
+__all__ = [
+    "Pattern",
+    "Trial",
+    "Waters",
+    "grown_to_entries",
+    "touches_entries",
+    "trial_with_legs",
+    "walk_round_tree",
+]
 
 TRIM = 0.8
 """Share of the tolerable distance to the shore that a transect stops short of it."""
@@ -114,7 +122,7 @@ class Trial:
         return float(self.path.length)
 
 
-def walked(waters: Waters, pattern: Pattern, circuit: Circuit) -> Trial:
+def walk_round_tree(waters: Waters, pattern: Pattern, circuit: Circuit) -> Trial:
     """Walk round a tree of lines, and round branches to what is out of reach of it; from launch to recovery.
 
     Parameters
@@ -145,10 +153,10 @@ def walked(waters: Waters, pattern: Pattern, circuit: Circuit) -> Trial:
     # A cut may have parted an entry from the region. What the region encloses once grown back to it is filled.
     if not touches_entries(region, waters):
         region = Polygon(grown_to_entries(region, waters, brush).exterior)
-    return finished(waters, pattern, circuit, Walk(region, walk.cuts, walk.enclosed))
+    return trial_with_legs(waters, pattern, circuit, Walk(region, walk.cuts, walk.enclosed))
 
 
-def finished(waters: Waters, pattern: Pattern, circuit: Circuit, walk: Walk) -> Trial:
+def trial_with_legs(waters: Waters, pattern: Pattern, circuit: Circuit, walk: Walk) -> Trial:
     """A walk that touches both entries, with its legs; smoothed first where its ring all but touches itself.
 
     Parameters
@@ -173,7 +181,7 @@ def finished(waters: Waters, pattern: Pattern, circuit: Circuit, walk: Walk) -> 
             break
         walk = Walk(_smoothed(walk.region, waters, width_m), walk.cuts, walk.enclosed)
         width_m /= 4
-    path = joined(
+    path = path_with_legs(
         walk.region,
         waters.launch,
         waters.recovery,
@@ -195,7 +203,7 @@ def _smoothed(region: Polygon, waters: Waters, width_m: float) -> Polygon:
 def _started(waters: Waters, circuit: Circuit, brush: Brush) -> Polygon:
     """The circuit's region; water too narrow for any transect starts from the launch point's entry."""
     if circuit.transects:
-        return dilated(circuit, brush)
+        return dilated_circuit(circuit, brush)
     radius_m = min(brush.half_width_m, START * waters.spacing_m)
     return largest(waters.launch.entry.buffer(radius_m).intersection(waters.free))
 

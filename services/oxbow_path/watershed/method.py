@@ -12,12 +12,12 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-from oxbow_path.improvement import improved, method_plan
+from oxbow_path.improvement import improved_line, method_plan
 from oxbow_path.refinement import Polyline
 from oxbow_path.task import Display, MethodPlan, Task
 from oxbow_path.walk.remainder import with_remainder
-from oxbow_path.walk.spacing import Budget, Fit, fitted
-from oxbow_path.walk.trial import Pattern, Trial, Waters, walked
+from oxbow_path.walk.spacing import Budget, Fit, fit_spacing
+from oxbow_path.walk.trial import Pattern, Trial, Waters, walk_round_tree
 from oxbow_path.watershed.contours import contour_tree
 
 __all__ = ["plan_watershed", "try_contours", "watershed"]
@@ -52,7 +52,7 @@ def watershed(task: Task, display: Display) -> MethodPlan:
     display.lines("contours", fit.chosen.circuit.transects)
     display.lines("links", fit.chosen.circuit.links)
     path = Polyline.of(fit.chosen.path, task.waters.passable.free_and_rounding)
-    return method_plan(improved(path, task, display), fit)
+    return method_plan(improved_line(path, task, display), fit)
 
 
 def plan_watershed(waters: Waters, budget: Budget) -> Fit:
@@ -76,7 +76,7 @@ def plan_watershed(waters: Waters, budget: Budget) -> Fit:
         Even the shortest way from launch to recovery is longer than the vehicle can go.
     """
     attempt = partial(try_contours, waters)
-    fit = fitted(attempt, FIRST_SPACING * waters.spacing_m, budget, widest_m=waters.widest_m)
+    fit = fit_spacing(attempt, FIRST_SPACING * waters.spacing_m, budget, widest_m=waters.widest_m)
     return replace(fit, chosen=with_remainder(fit.chosen, waters, budget))
 
 
@@ -103,4 +103,4 @@ def try_contours(waters: Waters, pattern: Pattern) -> Trial:
         first_m=pattern.trim_m + pattern.half_width_m,
         spacing_m=2 * pattern.spacing_m,
     )
-    return walked(waters, pattern, circuit)
+    return walk_round_tree(waters, pattern, circuit)

@@ -39,9 +39,9 @@ def ring(share: Polygon, gate) -> LineString:
     return line
 
 
-def joined(approach: Approach, start, recovery) -> LineString:
+def with_legs(approach: Approach, start, recovery) -> LineString:
     assert approach.launch == approach.recovery
-    path = approach.joined(ring(EAST, approach.launch))
+    path = approach.with_legs(ring(EAST, approach.launch))
     assert path.is_simple
     assert (path.coords[0], path.coords[-1]) == (start, recovery)
     return path
@@ -53,7 +53,7 @@ def test_out_and_home_from_one_place(start):
     approach = Harbour(SPACE, SPACING_M).approach(EAST, vehicle(start))
     assert EAST.covers(Point(approach.launch))
     assert approach.space.free.area == pytest.approx(EAST.area)
-    path = joined(approach, start, start)
+    path = with_legs(approach, start, start)
     entry = FREE.distance(Point(start))
     # Straight out, whatever the distance of the two ways: no leg runs along the shore.
     stray = path - FREE.buffer(0.01) - Point(start).buffer(1.2 * entry + 0.01)
@@ -63,7 +63,7 @@ def test_out_and_home_from_one_place(start):
 @given(start=afloat, recovery=ashore | afloat)
 @quick
 def test_out_from_one_place_and_home_to_another(start, recovery):
-    joined(Harbour(SPACE, SPACING_M).approach(EAST, vehicle(start, recovery)), start, recovery)
+    with_legs(Harbour(SPACE, SPACING_M).approach(EAST, vehicle(start, recovery)), start, recovery)
 
 
 @given(start=afloat, spacing_m=st.sampled_from([20.0, 150.0]))
@@ -72,7 +72,7 @@ def test_what_legs_take_is_their_length(start, spacing_m):
     approach = Harbour(SPACE, spacing_m).approach(EAST, vehicle(start))
     around = ring(EAST, approach.launch)
     kept_m = 1e5 - approach.length_m(1e5)
-    taken_m = approach.joined(around).length - around.length
+    taken_m = approach.with_legs(around).length - around.length
     # What is kept back and not used, the vehicle does not survey with.
     assert taken_m <= kept_m <= taken_m + 0.5 * spacing_m
 
@@ -94,7 +94,7 @@ def test_a_vehicle_at_its_share_has_no_legs():
         assert approach.space.water.equals(LAKE)
         assert approach.length_m(5.0) == 5.0
         path = LineString([start, (800, 200), start])
-        assert approach.joined(path) is path
+        assert approach.with_legs(path) is path
 
 
 def test_a_way_that_is_longer_than_the_range_is_refused_with_its_length():
@@ -119,7 +119,7 @@ def test_lanes_are_as_narrow_as_the_water():
     assert isinstance(share, Polygon)
     approach = Harbour(space, SPACING_M).approach(share, vehicle((100.0, 100.0)))
     assert 4.0 * approach.apart_m <= 2.0
-    path = approach.joined(ring(share, approach.launch))
+    path = approach.with_legs(ring(share, approach.launch))
     assert path.is_simple
     assert (path - free.buffer(0.01)).is_empty
 
@@ -135,7 +135,7 @@ def test_once_in_free_space_legs_keep_to_it(start):
     free = water.buffer(-5.0, join_style="mitre")
     space = FreeSpace(free=free, water=water, tolerance_m=1.0, compression=1.0)
     share = free & box(600, 0, 1000, 400)
-    path = joined(Harbour(space, SPACING_M).approach(share, vehicle(start)), start, start)
+    path = with_legs(Harbour(space, SPACING_M).approach(share, vehicle(start)), start, start)
     assert free.covers(Point(start))
     assert (path - free.buffer(0.01)).is_empty
 

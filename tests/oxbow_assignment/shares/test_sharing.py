@@ -16,7 +16,7 @@ from oxbow.wire.recording import discard
 from oxbow_assignment.service import handle
 from oxbow_assignment.shares.partition import BALANCE
 from oxbow_assignment.shares.reach import SPARE
-from oxbow_assignment.shares.sharing import TRIANGLES, shared
+from oxbow_assignment.shares.sharing import TRIANGLES, share_water
 from tests.support.path_requests import lake
 from tests.support.treatment_scenes import master
 
@@ -129,7 +129,7 @@ def test_the_farthest_arm_goes_to_who_reaches_it(order):
 def test_a_strip_is_shared_in_triangles_as_long_as_they_suffice():
     strip = box(0, 0, 500, 0.1)
     vehicles = boats(2_000.0, 2_000.0, 2_000.0, place=(0.0, 0.0))
-    sharing = shared(strip, vehicles)
+    sharing = share_water(strip, vehicles)
     assert len(sharing.partition.mesh) <= 3 * TRIANGLES * len(vehicles)
     assert sharing.imbalance <= BALANCE
 

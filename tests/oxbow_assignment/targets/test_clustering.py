@@ -7,7 +7,13 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import cdist, pdist, squareform
 
 from oxbow.errors import InvalidMission
-from oxbow_assignment.targets.clustering import cluster_by_radius, faded, fuzzy_c_means, k_means, mean_distances
+from oxbow_assignment.targets.clustering import (
+    cluster_by_radius,
+    fading_weights,
+    fuzzy_c_means,
+    k_means,
+    mean_distances,
+)
 from oxbow_assignment.targets.pseudo_coordinates import pseudo_coordinates
 
 quick = settings(max_examples=25)
@@ -130,8 +136,10 @@ def test_the_mean_route_is_the_largest_difference_of_columns(seed, count, k):
 
 def test_weights_fade_smoothly_from_one_to_zero():
     since = np.linspace(-10.0, 130.0, 200)
-    weights = faded(since, 100.0)
-    assert faded(np.array([np.nan, 0.0, 50.0, 100.0, 1e9]), 100.0) == pytest.approx([1.0, 1.0, 0.5, 0.0, 0.0])
+    weights = fading_weights(since, 100.0)
+    assert fading_weights(np.array([np.nan, 0.0, 50.0, 100.0, 1e9]), 100.0) == pytest.approx(
+        [1.0, 1.0, 0.5, 0.0, 0.0]
+    )
     assert (np.diff(weights) <= 0.0).all()
     assert np.abs(np.diff(weights, 2)).max() < 1e-3
 
@@ -145,7 +153,7 @@ def test_clusters_do_not_churn_after_a_visit(seed):
     first = k_means(coordinates, 4, seed=seed)
     weights, clusters, steps = np.ones(40), first, []
     for since in np.linspace(0.0, 100.0, 21):
-        weights[0] = faded(np.array([since]), 100.0)[0]
+        weights[0] = fading_weights(np.array([since]), 100.0)[0]
         moved = k_means(coordinates, 4, weights=weights, centres=clusters.centres)
         steps.append(np.linalg.norm(moved.centres - clusters.centres, axis=1).max())
         clusters = moved
@@ -176,7 +184,7 @@ def test_a_target_that_has_faded_away_founds_no_cluster():
         (lambda c: k_means(c, 2, weights=np.ones(4)), "weights: expected 5"),
         (lambda c: cluster_by_radius(c, -1.0), "radius_m: is -1.0 m"),
         (lambda c: cluster_by_radius(c, np.nan), "radius_m: is nan m"),
-        (lambda _: faded(np.zeros(1), 0.0), "fade_s: is 0.0 s"),
+        (lambda _: fading_weights(np.zeros(1), 0.0), "fade_s: is 0.0 s"),
     ],
 )
 def test_bad_requests_are_named(ask, says):

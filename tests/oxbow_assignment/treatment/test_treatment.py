@@ -16,10 +16,10 @@ from oxbow.geometry.route import RouteMethod, make_router
 from oxbow.testing import nasty_polygons
 from oxbow_assignment.treatment import division
 from oxbow_assignment.treatment.campaign import plan_campaign
-from oxbow_assignment.treatment.division import divided
+from oxbow_assignment.treatment.division import divide_treatments
 from oxbow_assignment.treatment.fleet import Fleet
 from oxbow_assignment.treatment.passes import parallel_passes
-from oxbow_assignment.treatment.sorties import scheduled
+from oxbow_assignment.treatment.sorties import schedule_sorties
 from oxbow_assignment.treatment.spots import waters
 from oxbow_assignment.treatment.treatment import COVERED, MOST_PASSES, Treatment, treatment_of
 from tests.support.path_requests import lake
@@ -128,7 +128,7 @@ def fleet(*slaves, free: Polygon = SEA) -> Fleet:
 def test_a_long_treatment_is_divided_into_parts_that_fit(length_m):
     found = treatment(box(100, -50, 300, 50), SEA, 10.0)
     boats = fleet(slave((0.0, 0.0), length_m=length_m), slave((0.0, 10.0), name="small", length_m=length_m / 2))
-    made = divided([found], boats)
+    made = divide_treatments([found], boats)
     stretches = [(part.since, part.until) for part in made.parts]
     stretches += [(other.part.since, other.part.until) for other in made.out_of_reach]
     ends = np.array(sorted(stretches))
@@ -145,7 +145,7 @@ def test_a_long_treatment_is_divided_into_parts_that_fit(length_m):
 
 def test_what_fits_stays_whole():
     found = treatment(box(100, -50, 300, 50), SEA, 10.0)
-    made = divided([found], fleet(slave((0.0, 0.0))))
+    made = divide_treatments([found], fleet(slave((0.0, 0.0))))
     assert [part.line for part in made.parts] == [found.line]
     assert not made.out_of_reach
 
@@ -154,7 +154,7 @@ def test_as_few_parts_as_the_range_allows():
     found = treatment(box(100, -50, 300, 50), SEA, 10.0)
     boat = slave((0.0, 0.0), length_m=2_000.0)
     assert found.line.length == pytest.approx(2_090.0)
-    assert len(divided([found], fleet(boat)).parts) == 2
+    assert len(divide_treatments([found], fleet(boat)).parts) == 2
 
 
 def test_too_many_parts_are_refused(monkeypatch):
@@ -163,7 +163,7 @@ def test_too_many_parts_are_refused(monkeypatch):
     with pytest.raises(
         Infeasible, match=r"hot_spots: take 10 km of passes, in 1[0-9] parts that fit .* at most 9"
     ):
-        divided([found], fleet(slave((0.0, 0.0), length_m=1_500.0)))
+        divide_treatments([found], fleet(slave((0.0, 0.0), length_m=1_500.0)))
 
 
 @quick
@@ -173,8 +173,8 @@ def test_no_other_way_to_turn_the_parts_is_shorter(seed, boats):
     found = [treatment(spot.area, SEA, 40.0) for spot in hot_spots(rng, SEA, 5, 100.0)]
     places = rng.uniform(-900.0, 900.0, (2 * boats, 2)).tolist()
     slaves = [slave(tuple(places[b]), name=f"{b}", recovery=tuple(places[boats + b])) for b in range(boats)]
-    parts = divided(found, fleet(*slaves)).parts
-    schedule = scheduled(parts, fleet(*slaves))
+    parts = divide_treatments(found, fleet(*slaves)).parts
+    schedule = schedule_sorties(parts, fleet(*slaves))
     assert len(schedule.rounds) == 1
     tours = {tour.vehicle: tour.length_m for tour in schedule.first.best.tours}
     for journey in schedule.rounds[0]:
@@ -218,5 +218,5 @@ def test_what_is_worth_most_a_metre_goes_first():
 
 
 def test_no_hot_spots_take_no_sorties():
-    assert scheduled([], fleet(slave((0.0, 0.0)))).rounds == ()
+    assert schedule_sorties([], fleet(slave((0.0, 0.0)))).rounds == ()
     assert shapely.get_num_geometries(waters([], SEA)).size == 0

@@ -11,7 +11,7 @@ from shapely import LineString, Point, Polygon, box
 
 from oxbow.contracts import WeightedArea
 from oxbow.tolerances import ROUNDING_M
-from oxbow_path.refinement import Guard, Polyline, RefinementStep, Samples, refined, smoothed
+from oxbow_path.refinement import Guard, Polyline, RefinementStep, Samples, refined_path, smoothed_path
 from oxbow_path.refinement import guard as guard_module
 from oxbow_path.refinement.nearness import nearer
 from oxbow_path.refinement.pull import Pull, feet
@@ -131,9 +131,9 @@ def test_one_sharp_place_does_not_hold_the_rest():
     moved = guard.moved(path, target)
     assert moved.line.is_simple
     assert (moved.nodes[1:-1] == target[1:-1]).all()
-    refined_path = refine(line, SQUARE, 1.3 * line.length)
-    assert conforms(refined_path, SQUARE)
-    assert refined_path.length >= 1.2 * line.length
+    refined = refine(line, SQUARE, 1.3 * line.length)
+    assert conforms(refined, SQUARE)
+    assert refined.length >= 1.2 * line.length
 
 
 @pytest.mark.parametrize("spacing_m", [250.0, 30.0])
@@ -224,7 +224,7 @@ def test_a_lattice_leaves_no_hole():
 
 def refine(path: LineString, water: Polygon, length_m: float, areas=(), stop=never) -> LineString:
     spacing_m = water.area / length_m
-    return refined(
+    return refined_path(
         Polyline.of(path, water.buffer(1e-6)),
         water,
         Samples.over(water, 0.25 * spacing_m, areas),
@@ -271,7 +271,7 @@ def test_a_path_near_enough_to_all_water_is_left_as_it_is():
     samples = Samples.over(SQUARE, 30.0)
     farthest_m = shapely.distance(MEANDER, shapely.points(samples.points)).max()
     for enough_m, is_left in ((1.01 * farthest_m, True), (0.99 * farthest_m, False)):
-        path = refined(
+        path = refined_path(
             Polyline.of(MEANDER, SQUARE),
             SQUARE,
             samples,
@@ -288,7 +288,7 @@ def test_rigid_segments_stay_straight():
     spacing_m = SQUARE.area / MEANDER.length
     across, along = np.abs(np.diff(shapely.get_coordinates(MEANDER), axis=0)).T
     rigid = (across == 0.0) & (along > 300.0)
-    moved = refined(
+    moved = refined_path(
         Polyline.of(MEANDER, SQUARE.buffer(1e-6), rigid),
         SQUARE,
         Samples.over(SQUARE, 0.2 * spacing_m),
@@ -320,7 +320,7 @@ def turns(path: LineString) -> np.ndarray:
 def test_smoothing_rounds_corners_and_keeps_the_rest(seed):
     water = lake(seed)
     path = walk_inside(water, 150.0)
-    smooth = smoothed(Polyline.of(path, water.buffer(1e-6)), water, 150.0)
+    smooth = smoothed_path(Polyline.of(path, water.buffer(1e-6)), water, 150.0)
     assert conforms(smooth, water)
     assert smooth.length <= path.length
     assert smooth.coords[0] == path.coords[0]
@@ -330,6 +330,6 @@ def test_smoothing_rounds_corners_and_keeps_the_rest(seed):
 
 def test_smoothing_leaves_straight_lines_straight():
     path = LineString([(0, 500), (900, 500), (900, 900)])
-    smooth = smoothed(Polyline.of(path, SQUARE.buffer(1e-6)), SQUARE, 100.0)
+    smooth = smoothed_path(Polyline.of(path, SQUARE.buffer(1e-6)), SQUARE, 100.0)
     assert smooth.distance(Point(450, 500)) < 1e-9
     assert smooth.distance(Point(900, 500)) > 1.0

@@ -13,7 +13,7 @@ from oxbow.wire.recording import discard
 from oxbow_path.refinement import Guard, Polyline
 from oxbow_path.service import handle
 from oxbow_path.space_filling_curve.draws import cell_draws, drawn_places
-from oxbow_path.space_filling_curve.kohonen import UpdateSchedule, organised
+from oxbow_path.space_filling_curve.kohonen import UpdateSchedule, organised_curve
 from tests.support.path_requests import lake, request
 
 quick = settings(max_examples=12)
@@ -75,7 +75,7 @@ def test_every_epoch_keeps_the_ring_inside_and_simple(seed, width):
     ring = Polyline.of(LineString(inner.simplify(5.0).exterior), water.buffer(1e-6))
     draws = np.random.default_rng(seed).uniform(*np.reshape(water.bounds, (2, 2)), (3000, 2))
     length_m = 2 * ring.length_m
-    epochs = organised(
+    epochs = organised_curve(
         ring,
         draws,
         np.ones(len(draws)),
@@ -96,7 +96,7 @@ def test_nodes_follow_the_length():
     square = box(0, 0, 1000, 1000)
     ring = Polyline.of(LineString(box(200, 200, 800, 800).exterior), square.buffer(1e-6))
     draws = np.random.default_rng(0).uniform(0, 1000, (10_000, 2))
-    *_, last = organised(
+    *_, last = organised_curve(
         ring,
         draws,
         np.ones(len(draws)),

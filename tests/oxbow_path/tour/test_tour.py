@@ -16,12 +16,12 @@ from oxbow.errors import Infeasible
 from oxbow.testing import nasty_polygons
 from oxbow_path.task import Task
 from oxbow_path.tour.geodesic import ShoreSights
-from oxbow_path.tour.local_search import shortened
-from oxbow_path.tour.outline import enclosed
+from oxbow_path.tour.local_search import shortened_tour
+from oxbow_path.tour.outline import enclosed_region
 from oxbow_path.tour.planner import TourPlan, plan_tour
-from oxbow_path.tour.pruning import pruned
-from oxbow_path.tour.pyvrp_solver import is_installed, polished
-from oxbow_path.tour.sites import clustered, low_discrepancy, with_gaps
+from oxbow_path.tour.pruning import pruned_order
+from oxbow_path.tour.pyvrp_solver import is_installed, polished_tour
+from oxbow_path.tour.sites import cluster_centres, low_discrepancy, with_gaps
 from oxbow_path.tour.slits import slit, slit_in_turn
 from oxbow_path.tour.start import Start, first_tour
 from oxbow_path.walk.region import largest
@@ -33,8 +33,8 @@ SQUARE = box(0, 0, 100, 100)
 HORSESHOE = SQUARE.difference(box(20, 0, 80, 90))
 NASTY = nasty_polygons()
 SOLVERS = [
-    shortened,
-    pytest.param(polished, marks=pytest.mark.skipif(not is_installed(), reason="needs oxbow[tour]")),
+    shortened_tour,
+    pytest.param(polished_tour, marks=pytest.mark.skipif(not is_installed(), reason="needs oxbow[tour]")),
 ]
 
 
@@ -69,7 +69,7 @@ def test_samples_are_more_even_than_random_ones():
 @quick
 @given(seed=st.integers(0, 1000), count=st.integers(8, 60))
 def test_clusters_lie_in_the_water_as_evenly_as_their_number_allows(seed, count):
-    centres = clustered(low_discrepancy(HORSESHOE, 25 * count, seed=seed), count, HORSESHOE)
+    centres = cluster_centres(low_discrepancy(HORSESHOE, 25 * count, seed=seed), count, HORSESHOE)
     assert len(centres) == count
     assert shapely.contains_xy(HORSESHOE, centres).all()
     pitch = math.sqrt(HORSESHOE.area / count)
@@ -91,7 +91,7 @@ def test_gaps_are_closed_and_nothing_else_is_added():
 @pytest.mark.parametrize("name", sorted(NASTY))
 def test_geodesic_distances_are_those_of_ways_inside_and_no_shorter_than_straight(name):
     water = NASTY[name]
-    sites = clustered(low_discrepancy(water, 600, seed=2), 40, water)
+    sites = cluster_centres(low_discrepancy(water, 600, seed=2), 40, water)
     geodesics = ShoreSights(water).geodesics(sites)
     distance = np.array([geodesics.from_site(site) for site in range(len(sites))])
     assert np.isfinite(distance).all()
@@ -133,7 +133,7 @@ def test_the_spanning_tree_is_that_of_all_distances(seed):
 @pytest.mark.parametrize("name", sorted(NASTY))
 def test_the_first_tour_passes_three_legs_of_the_tree_at_most(name):
     water = NASTY[name]
-    geodesics = ShoreSights(water).geodesics(clustered(low_discrepancy(water, 400, seed=3), 40, water))
+    geodesics = ShoreSights(water).geodesics(cluster_centres(low_discrepancy(water, 400, seed=3), 40, water))
     start = first_tour(geodesics, 10.0)
     assert sorted(start.order) == list(range(geodesics.count))
     legs = np.asarray(start.distances[start.order, np.roll(start.order, -1)])
@@ -172,7 +172,7 @@ def test_a_tour_visits_every_site_once_and_is_no_longer_than_the_first(solver, s
 @given(seed=st.integers(0, 1000))
 def test_no_exchange_of_two_legs_shortens_a_tour(seed):
     start = random_start(seed, 60)
-    order = shortened(start, seed=0).order
+    order = shortened_tour(start, seed=0).order
     distance = start.distances.toarray()
     here, there = order, np.roll(order, -1)
     legs = distance[here, there]
@@ -184,9 +184,9 @@ def test_no_exchange_of_two_legs_shortens_a_tour(seed):
 
 
 def test_a_tour_of_even_sites_has_about_the_length_that_the_first_count_expects():
-    sites = clustered(low_discrepancy(SQUARE, 10_000, seed=0), 400, SQUARE)
+    sites = cluster_centres(low_discrepancy(SQUARE, 10_000, seed=0), 400, SQUARE)
     start = first_tour(ShoreSights(SQUARE).geodesics(sites), 20.0)
-    length = start.length_m(shortened(start, seed=0).order)
+    length = start.length_m(shortened_tour(start, seed=0).order)
     assert length == pytest.approx(0.98 * math.sqrt(400 * SQUARE.area), rel=0.04)
 
 
@@ -194,14 +194,14 @@ def test_pruning_keeps_the_entries_and_shortens_arms_alike():
     comb = shapely.union_all([box(0, 0, 100, 10), *(box(x, 0, x + 2, 90) for x in (10, 50, 88))])
     sites = np.array([[5.0, 5.0], *([x + 1.0, y] for x in (10, 50, 88) for y in range(5, 90, 5)), [99.0, 5.0]])
     geodesics = ShoreSights(comb).geodesics(sites)
-    order = shortened(first_tour(geodesics, 50.0), seed=0).order
+    order = shortened_tour(first_tour(geodesics, 50.0), seed=0).order
     length = LineString(geodesics.way(order)).length
-    left = pruned(order, geodesics, kept=1, length_m=0.7 * length)
+    left = pruned_order(order, geodesics, kept=1, length_m=0.7 * length)
     assert 0 in left
     assert LineString(geodesics.way(left)).length == pytest.approx(0.7 * length, rel=0.05)
     tips = [sites[left][sites[left][:, 0] == x + 1.0][:, 1].max() for x in (10, 50, 88)]
     assert max(tips) - min(tips) <= 10.0
-    assert pruned(order, geodesics, kept=1, length_m=0.0).tolist() == [0]
+    assert pruned_order(order, geodesics, kept=1, length_m=0.0).tolist() == [0]
 
 
 # --------------------------------------------------------------------------- outlines
@@ -222,7 +222,7 @@ def test_pruning_keeps_the_entries_and_shortens_arms_alike():
     ids=["plain", "crossing", "spur", "tree", "spur inwards", "chord", "there and back", "one place"],
 )
 def test_the_outline_of_any_tour_is_one_ring_near_all_its_places(way, places):
-    region = enclosed(np.array([*way, way[0]], dtype=float), SQUARE, 1.0)
+    region = enclosed_region(np.array([*way, way[0]], dtype=float), SQUARE, 1.0)
     assert region.is_valid
     assert SQUARE.covers(region)
     assert LineString(region.exterior).is_simple
@@ -279,7 +279,7 @@ def test_a_slit_round_an_island_is_slit_and_one_that_leaves_nothing_is_not():
 def test_the_outline_of_a_tour_in_random_order_is_sound(seed, count):
     order = np.random.default_rng(seed).permutation(count)
     way = ShoreSights(HORSESHOE).geodesics(low_discrepancy(HORSESHOE, count, seed=seed)).way(order)
-    region = enclosed(way, HORSESHOE, 0.5)
+    region = enclosed_region(way, HORSESHOE, 0.5)
     assert region.is_valid
     assert HORSESHOE.buffer(1e-6).covers(region)
 
@@ -290,8 +290,8 @@ def test_the_outline_of_a_tour_in_random_order_is_sound(seed, count):
 def test_the_outline_of_a_tour_passes_all_of_it(name, seed, count):
     water = NASTY[name]
     geodesics = ShoreSights(water).geodesics(low_discrepancy(water, count, seed=seed))
-    way = geodesics.way(shortened(first_tour(geodesics, 100.0), seed=0).order)
-    region = enclosed(way, water, 0.3)
+    way = geodesics.way(shortened_tour(first_tour(geodesics, 100.0), seed=0).order)
+    region = enclosed_region(way, water, 0.3)
     assert region.buffer(0.6).covers(LineString(way))
 
 
@@ -299,7 +299,7 @@ def test_the_outline_of_a_tour_passes_all_of_it(name, seed, count):
 
 
 def planned(asked: PathRequest) -> TourPlan:
-    return plan_tour(Task.of(asked, lambda: False), solver=shortened)
+    return plan_tour(Task.of(asked, lambda: False), solver=shortened_tour)
 
 
 def require_sound(plan: TourPlan, asked: PathRequest) -> None:

@@ -11,7 +11,7 @@ from oxbow.geometry.route.gate_routes import Routes
 from oxbow.wire.recording import discard
 from oxbow_path.service import handle
 from oxbow_path.walk.access import access
-from oxbow_path.walk.legs import Passable, joined
+from oxbow_path.walk.legs import Passable, path_with_legs
 from tests.support.path_requests import request
 
 WATER = box(0, 0, 1000, 600)
@@ -53,7 +53,7 @@ def test_a_leg_round_a_corner_stays_in_the_water():
 )
 def test_legs_join_the_ring(launch, recovery):
     region = REGION.union(box(10, 290, 100, 310)).union(box(900, 290, 990, 310)).union(box(490, 10, 510, 100))
-    path = joined(region, leg(launch), leg(recovery), Passable(FREE), opening_m=5.0, detail_m=50.0)
+    path = path_with_legs(region, leg(launch), leg(recovery), Passable(FREE), opening_m=5.0, detail_m=50.0)
     assert path.is_simple
     assert path.coords[0] == launch
     assert path.coords[-1] == recovery
@@ -68,7 +68,7 @@ def test_the_way_through_goes_round_an_enclosed_island():
     legs = [
         access(place, free, Routes(water, 50.0), where="LaunchPoint") for place in ((0.0, 300.0), (1000.0, 300.0))
     ]
-    path = joined(region, *legs, Passable(free), opening_m=5.0, detail_m=50.0)
+    path = path_with_legs(region, *legs, Passable(free), opening_m=5.0, detail_m=50.0)
     assert path.is_simple
     assert path.distance(Point(500, 300)) >= 59.9
 
@@ -78,7 +78,7 @@ def test_a_ring_that_shows_only_one_side_of_a_corner_is_opened_beside_it():
     free = box(-50, -50, 50, 50) - box(-2, -3, -1, 3)
     region = Polygon([(-9, -20), (-3, 10), (-13, 8), (-13, 40), (40, 40), (40, -20)])
     launch = access((2.5, 0.0), free, Routes(free, 50.0), where="LaunchPoint")
-    path = joined(region, launch, launch, Passable(free), opening_m=1.0, detail_m=10.0)
+    path = path_with_legs(region, launch, launch, Passable(free), opening_m=1.0, detail_m=10.0)
     assert path.is_simple
 
 
@@ -88,7 +88,7 @@ def test_legs_of_two_places_up_one_creek_run_beside_one_another():
     legs = [access(place, FREE, Routes(creek, 50.0), where="LaunchPoint") for place in places]
     region = REGION | box(10, 290, 100, 316)
     for launch, recovery in itertools.product(legs, repeat=2):
-        path = joined(region, launch, recovery, Passable(FREE), opening_m=5.0, detail_m=50.0)
+        path = path_with_legs(region, launch, recovery, Passable(FREE), opening_m=5.0, detail_m=50.0)
         assert path.is_simple
         assert (path.coords[0], path.coords[-1]) == (launch.place, recovery.place)
         land_m = launch.land_m + recovery.land_m
@@ -103,7 +103,7 @@ def test_legs_that_meet_at_a_slant_in_a_winding_creek_run_beside_one_another():
     legs = [access(place, FREE, Routes(creek, 5.0), where="LaunchPoint") for place in places]
     region = REGION | box(10, 280, 100, 330)
     for launch, recovery in itertools.permutations(legs, 2):
-        path = joined(region, launch, recovery, Passable(FREE), opening_m=5.0, detail_m=50.0)
+        path = path_with_legs(region, launch, recovery, Passable(FREE), opening_m=5.0, detail_m=50.0)
         assert path.is_simple
         assert (path.coords[0], path.coords[-1]) == (launch.place, recovery.place)
 
@@ -151,7 +151,7 @@ def test_a_place_out_of_sight_of_the_ring_is_led_to_it_past_what_stands_between(
     free = FREE - islands
     routes = Routes(free | box(480, 210, 520, 220), 50.0)
     legs = [access(place, free, routes, where="LaunchPoint") for place in (launch, recovery)]
-    path = joined(REGION, *legs, Passable(free), opening_m=5.0, detail_m=50.0)
+    path = path_with_legs(REGION, *legs, Passable(free), opening_m=5.0, detail_m=50.0)
     assert path.is_simple
     assert (path.coords[0], path.coords[-1]) == (launch, recovery)
     assert path.difference(free.buffer(1e-6)).length <= sum(leg.line.length for leg in legs) + 1.0

@@ -16,8 +16,8 @@ from oxbow_path.service import handle
 from oxbow_path.task import prepared_waters
 from oxbow_path.walk.circuit import plan_circuit
 from oxbow_path.walk.gaps import reach_gaps
-from oxbow_path.walk.probe import Probe, covered
-from oxbow_path.walk.region import Brush, Walk, dilated, simply_connected
+from oxbow_path.walk.probe import Probe, all_within_reach
+from oxbow_path.walk.region import Brush, Walk, dilated_circuit, simply_connected
 from oxbow_path.walk.transects import place_transects
 from tests.support.path_requests import lake, request
 
@@ -70,7 +70,7 @@ def test_after_the_gaps_no_water_is_out_of_reach(seed):
     transects = place_transects(waters.cells, 2 * spacing, phase=0.25, min_length_m=2 * spacing)
     circuit = plan_circuit(waters.cells, transects, trim_m=60.0, inset_m=160.0)
     brush = Brush(waters.free, spacing / 2, 60.0)
-    start = dilated(circuit, brush) if transects else waters.free.representative_point().buffer(20.0)
+    start = dilated_circuit(circuit, brush) if transects else waters.free.representative_point().buffer(20.0)
     walk = reach_gaps(
         Walk(Polygon(start.exterior)), brush, waters.probe, waters.routes, reach_m=150.0, cut_width_m=50.0
     )
@@ -80,10 +80,10 @@ def test_after_the_gaps_no_water_is_out_of_reach(seed):
 
 def test_covered_needs_a_step_within_reach():
     points = np.array([[0.0, 0.0], [3.0, 0.0]])
-    assert covered(points, np.array([[1.0, 0.0]]), 2.0)
-    assert not covered(points, np.array([[1.0, 0.0]]), 1.5)
-    assert not covered(points, np.empty((0, 2)), 1.5)
-    assert covered(np.empty((0, 2)), np.empty((0, 2)), 1.0)
+    assert all_within_reach(points, np.array([[1.0, 0.0]]), 2.0)
+    assert not all_within_reach(points, np.array([[1.0, 0.0]]), 1.5)
+    assert not all_within_reach(points, np.empty((0, 2)), 1.5)
+    assert all_within_reach(np.empty((0, 2)), np.empty((0, 2)), 1.0)
 
 
 def test_a_ring_in_narrow_water_that_all_but_touches_itself_is_smoothed_by_less():

@@ -6,7 +6,7 @@ from shapely import LineString, box
 from oxbow.errors import Infeasible
 from oxbow_path.walk.circuit import plan_circuit
 from oxbow_path.walk.region import Walk
-from oxbow_path.walk.spacing import Budget, fitted
+from oxbow_path.walk.spacing import Budget, fit_spacing
 from oxbow_path.walk.trial import Pattern, Trial
 from tests.support.path_requests import lake, request
 
@@ -21,14 +21,16 @@ def trial_of(length_m: float, spacing_m: float) -> Trial:
 @pytest.mark.parametrize("power", [0.6, 1.0, 1.6])
 def test_the_spacing_loop_finds_the_length(power):
     budget = Budget(limit_m=1000.0)
-    fit = fitted(lambda pattern: trial_of(30_000.0 / pattern.spacing_m**power, pattern.spacing_m), 10.0, budget)
+    fit = fit_spacing(
+        lambda pattern: trial_of(30_000.0 / pattern.spacing_m**power, pattern.spacing_m), 10.0, budget
+    )
     assert budget.is_enough(fit.chosen)
     assert len(fit.trials) <= 6
 
 
 def test_the_spacing_loop_keeps_the_least_spacing():
     budget = Budget(limit_m=1000.0, least_spacing_m=80.0)
-    fit = fitted(lambda pattern: trial_of(30_000.0 / pattern.spacing_m, pattern.spacing_m), 10.0, budget)
+    fit = fit_spacing(lambda pattern: trial_of(30_000.0 / pattern.spacing_m, pattern.spacing_m), 10.0, budget)
     assert [trial.pattern.spacing_m for trial in fit.trials] == [80.0]
 
 
@@ -39,4 +41,4 @@ def test_where_nothing_fits_the_shortest_path_is_named():
     with pytest.raises(
         Infeasible, match=r"is 1000 m; expected more than 2002\.\d m: the shortest .* is 2000\.\d m"
     ):
-        fitted(never_short, 10.0, Budget(limit_m=1000.0), widest_m=1e4)
+        fit_spacing(never_short, 10.0, Budget(limit_m=1000.0), widest_m=1e4)

@@ -17,7 +17,7 @@ from oxbow.arrays import FloatArray, Indices
 from oxbow.errors import Infeasible, InvalidMission
 from oxbow.geometry.route.danger import Danger
 from oxbow.geometry.route.mesh import Touches, WaterMesh
-from oxbow.geometry.route.route import Route, RouteMethod, RouteTable, judged
+from oxbow.geometry.route.route import Route, RouteMethod, RouteTable, measured_route
 from oxbow.geometry.route.search import Arcs, Ways, cheapest_ways, distinct
 
 __all__ = ["Drawn", "Ends", "Links", "Network", "NetworkRouter", "Way"]
@@ -136,7 +136,7 @@ class NetworkRouter:
         ends = _checked_ends(start, goal)
         found = self._found(ends, ["start", "goal"], starts=1)
         _require_way(found.costs[0, 1], ends)
-        return judged(self._line(found, 0, 1), self.network.mesh, self.network.danger, self.method)
+        return measured_route(self._line(found, 0, 1), self.network.mesh, self.network.danger, self.method)
 
     def distances(self, points: npt.ArrayLike) -> FloatArray:
         """Costs of the routes between all pairs; see `Router.distances`."""

@@ -16,7 +16,7 @@ from oxbow.contracts.route import RouteMethod
 from oxbow.geometry.route.danger import Danger
 from oxbow.geometry.route.mesh import WaterMesh
 
-__all__ = ["Route", "RouteMethod", "RouteTable", "Router", "judged"]
+__all__ = ["Route", "RouteMethod", "RouteTable", "Router", "measured_route"]
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class Router(Protocol):
         """
 
 
-def judged(polyline: FloatArray, mesh: WaterMesh, danger: Danger, method: RouteMethod) -> Route:
+def measured_route(polyline: FloatArray, mesh: WaterMesh, danger: Danger, method: RouteMethod) -> Route:
     """The route along a polyline, with its length, cost, danger and clearance.
 
     Parameters
