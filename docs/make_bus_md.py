@@ -24,6 +24,7 @@ from oxbow.contracts import (
     MAX_REQUEST_BYTES,
     PLAN_KEY,
     STAGES,
+    Approach,
     Cell,
     Conformance,
     ContourRequest,
@@ -40,6 +41,7 @@ from oxbow.contracts import (
     LeftSpot,
     Leg,
     Method,
+    MiddleLine,
     MissionKey,
     MissionState,
     MissionStatus,
@@ -106,6 +108,8 @@ INNER = (
     HotSpot,
     DangerZone,
     Share,
+    Approach,
+    MiddleLine,
     Sortie,
     LeftSpot,
     Variogram,
@@ -230,11 +234,16 @@ def _closed_sets() -> str:
 
 
 def _kinds_of(endpoint: Endpoint[Any, Any]) -> Iterator[type[msgspec.Struct]]:
-    """The request, the reply and the messages inside them that are explained nowhere else."""
-    for kind in (endpoint.request, endpoint.reply):
-        yield kind
-        annotations = " ".join(_annotations(kind).values())
-        yield from (inner for inner in INNER if re.search(rf"\b{inner.__name__}\b", annotations))
+    """The request, the reply and the messages inside them."""
+    return iter(dict.fromkeys((*_with_inner(endpoint.request), *_with_inner(endpoint.reply))))
+
+
+def _with_inner(kind: type[msgspec.Struct]) -> Iterator[type[msgspec.Struct]]:
+    yield kind
+    annotations = " ".join(_annotations(kind).values())
+    for inner in INNER:
+        if re.search(rf"\b{inner.__name__}\b", annotations):
+            yield from _with_inner(inner)
 
 
 def _message(kind: type[msgspec.Struct], level: int = 3) -> str:

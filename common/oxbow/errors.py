@@ -22,9 +22,13 @@ __all__ = [
     "ErrorReply",
     "Infeasible",
     "Internal",
+    "InvalidInput",
     "InvalidMission",
+    "InvalidOption",
+    "InvalidRequest",
     "OxbowError",
     "Unavailable",
+    "about_mission",
     "error_text",
     "renamed",
 ]
@@ -34,6 +38,8 @@ class ErrorCode(enum.StrEnum):
     """What went wrong, as a closed set; the command's exit status follows from it."""
 
     INVALID_MISSION = "invalid_mission"
+    INVALID_REQUEST = "invalid_request"
+    INVALID_OPTION = "invalid_option"
     INFEASIBLE = "infeasible"
     UNAVAILABLE = "unavailable"
     BUSY = "busy"
@@ -62,6 +68,15 @@ def error_text(error: BaseException) -> str:
 
 
 @contextmanager
+def about_mission() -> Iterator[None]:
+    """Report a request that breaks its contract as a fault of the mission that it was made from."""
+    try:
+        yield
+    except InvalidRequest as error:
+        raise InvalidMission(error.message, error.where) from error
+
+
+@contextmanager
 def renamed(fields: Mapping[str, str]) -> Iterator[None]:
     """Rename the fields in errors raised within to the names that the user knows them by.
 
@@ -76,10 +91,26 @@ def renamed(fields: Mapping[str, str]) -> Iterator[None]:
         raise type(error)(error.message, fields.get(error.where, error.where)) from error
 
 
-class InvalidMission(OxbowError):
-    """The input breaks a rule of the Mission File or of a message."""
+class InvalidInput(OxbowError):
+    """Base of the errors of whoever asked: what they gave breaks a rule, and would break it again."""
+
+
+class InvalidMission(InvalidInput):
+    """A mission breaks a rule of the Mission File."""
 
     code = ErrorCode.INVALID_MISSION
+
+
+class InvalidRequest(InvalidInput):
+    """A message, a key or an argument of a function breaks its contract."""
+
+    code = ErrorCode.INVALID_REQUEST
+
+
+class InvalidOption(InvalidInput):
+    """An option of a command, a setting of a process or a file that one of them names cannot be used."""
+
+    code = ErrorCode.INVALID_OPTION
 
 
 class Infeasible(OxbowError):
@@ -120,7 +151,17 @@ class Internal(OxbowError):
 
 BY_CODE: dict[ErrorCode, type[OxbowError]] = {
     kind.code: kind
-    for kind in (InvalidMission, Infeasible, Unavailable, Busy, DeadlineExceeded, Cancelled, Internal)
+    for kind in (
+        InvalidMission,
+        InvalidRequest,
+        InvalidOption,
+        Infeasible,
+        Unavailable,
+        Busy,
+        DeadlineExceeded,
+        Cancelled,
+        Internal,
+    )
 }
 
 

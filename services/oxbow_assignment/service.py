@@ -6,9 +6,11 @@ from collections.abc import Iterator, Sequence
 
 from msgspec import structs
 
-from oxbow.contracts import Assignment, AssignRequest, Role, Share, Sortie, Vehicle
+from oxbow.contracts import Assignment, AssignRequest, Role, Sortie, Vehicle
+from oxbow.contracts.budget import nominal_spacing_m
 from oxbow.geometry.route import Danger
 from oxbow.wire.recording import Show
+from oxbow_assignment.shares.approach import Harbour
 from oxbow_assignment.shares.sharing import share_water
 from oxbow_assignment.show import show_campaign, show_partition, show_shares
 from oxbow_assignment.treatment.campaign import Campaign, plan_campaign
@@ -34,7 +36,7 @@ def handle(request: AssignRequest, show: Show) -> Assignment:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         No vehicle has the role that is needed, hot spots overlap, or a number is out of proportion.
     Infeasible
         A vehicle cannot reach the free space and get home within its range.
@@ -80,9 +82,11 @@ def _shared(request: AssignRequest, show: Show) -> Assignment:
     """The free space shared among the masters."""
     masters = _with_role(request.vehicles, Role.MASTER)
     sharing = share_water(request.free, masters, request.footprint_m, request.water)
-    shares = tuple(
-        Share(vehicle=master.name, area=area) for master, area in zip(masters, sharing.areas, strict=True)
+    spacing_m = request.spacing_m or nominal_spacing_m(
+        request.free.area, sum(master.length_m for master in masters)
     )
+    harbour = Harbour(request.free, request.water or request.free, spacing_m)
+    shares = tuple(harbour.share(area, master) for master, area in zip(masters, sharing.areas, strict=True))
     if sharing.partition is not None:
         show_partition(sharing.partition, show)
     show_shares(shares, show)

@@ -83,8 +83,8 @@ def _asked(free: MultiPolygon, request: CertifyRequest) -> MultiPolygon:
     asked = polygons(shapely.union_all(request.areas).intersection(free))
     if not asked:
         raise Infeasible(
-            f"lie nowhere farther from the shore than Safety, {request.safety_m:g} m; expected some water that a"
-            " vehicle may enter",
+            f"lie nowhere farther from the shore than `safety_m` = {request.safety_m:g} m; expected some water"
+            " that a vehicle may enter",
             where="areas",
         )
     return MultiPolygon(asked)

@@ -251,14 +251,14 @@ def evaluate(
     - `oxbow evaluate lake.json --json`
     - `oxbow evaluate --compare lake-a.json lake-b.json`
     """
-    from oxbow.errors import InvalidMission
+    from oxbow.errors import InvalidOption
     from oxbow_cli import report
     from oxbow_cli.arguments import naming, read
     from oxbow_cli.comparison import compare as compare_paths
     from oxbow_cli.evaluation import evaluate
 
     if (file is None) == (compare is None):
-        raise InvalidMission("expected one Mission File, or two after --compare", where="FILE")
+        raise InvalidOption("expected one Mission File, or two after --compare", where="FILE")
     if compare is not None:
         missions = []
         for path in compare:

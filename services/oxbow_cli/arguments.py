@@ -14,7 +14,7 @@ import msgspec
 
 from oxbow.bus.config import require_endpoint
 from oxbow.contracts import MOST_DEADLINE_S, Draw, Method, RouteMethod
-from oxbow.errors import InvalidMission, OxbowError, renamed
+from oxbow.errors import InvalidOption, OxbowError, renamed
 from oxbow.geometry.frame import Position
 from oxbow.mission.file import Mission, read_mission
 from oxbow.mission.plan import PlanOptions
@@ -74,13 +74,13 @@ def position(text: str, where: str) -> Position:
 
     Raises
     ------
-    InvalidMission
+    InvalidOption
         The text is not two numbers.
     """
     try:
         lat, long = map(float, text.split(","))
     except ValueError as error:
-        raise InvalidMission(
+        raise InvalidOption(
             f"is {text!r}; expected LAT,LONG in degrees, such as 44.6,-73.3", where=where
         ) from error
     return Position(lat=lat, long=long)
@@ -122,11 +122,11 @@ def plan_options(
 
     Raises
     ------
-    InvalidMission
+    InvalidOption
         A name is unknown, or the heading is not finite; names the option.
     """
     if heading_deg is not None and not math.isfinite(heading_deg):
-        raise InvalidMission(f"is {heading_deg!r}; expected degrees clockwise from north", where="--heading")
+        raise InvalidOption(f"is {heading_deg!r}; expected degrees clockwise from north", where="--heading")
     return PlanOptions(
         method=_one_of(Method, method, "--method"),
         seed=seed,
@@ -140,7 +140,7 @@ def plan_options(
 
 def _one_of(names: type[E], text: str, where: str) -> E:
     if text not in set(names):
-        raise InvalidMission(f"is {text!r}; expected {' or '.join(names)}", where=where)
+        raise InvalidOption(f"is {text!r}; expected {' or '.join(names)}", where=where)
     return names(text)
 
 
@@ -161,7 +161,7 @@ def with_prior(mission: Mission, prior: Path | None) -> Mission:
 
     Raises
     ------
-    InvalidMission
+    InvalidOption
         The file cannot be read, or is no prior model.
     """
     return mission if prior is None else msgspec.structs.replace(mission, prior_model=read_prior(prior))
@@ -179,7 +179,7 @@ def replica_counts(texts: Iterable[str]) -> dict[str, int]:
 
     Raises
     ------
-    InvalidMission
+    InvalidOption
         A text has another form.
     """
     counts = {"path": max(2, os.cpu_count() or 1)}
@@ -187,7 +187,7 @@ def replica_counts(texts: Iterable[str]) -> dict[str, int]:
         stage, _, count = text.partition("=")
         # Whether the stage exists, and the count is at least 1, is for `StackSettings` to check.
         if not count.isdecimal():
-            raise InvalidMission(f"is {text!r}; expected STAGE=N, such as path=2", where="--replicas")
+            raise InvalidOption(f"is {text!r}; expected STAGE=N, such as path=2", where="--replicas")
         counts[stage] = int(count)
     return counts
 
@@ -206,7 +206,7 @@ def require_compatible(
 
     Raises
     ------
-    InvalidMission
+    InvalidOption
         Names the option.
     """
     _require_seconds("--timeout", timeout_s)
@@ -214,23 +214,23 @@ def require_compatible(
         _require_seconds("--time-limit", time_limit_s)
     # The limit is for improving alone; what comes before and after it needs some of the timeout, too.
     if time_limit_s is not None and time_limit_s >= timeout_s:
-        raise InvalidMission(
+        raise InvalidOption(
             f"is {time_limit_s:g} s; expected less than --timeout, {timeout_s:g} s", "--time-limit"
         )
     if local and connect is not None:
-        raise InvalidMission("plans in this process; give either --local or --connect", where="--local")
+        raise InvalidOption("plans in this process; give either --local or --connect", where="--local")
     if record is not None and (local or connect is not None):
-        raise InvalidMission(
+        raise InvalidOption(
             f"is {str(record)!r}; only a plan with neither --local nor --connect makes its own recording",
             where="--record",
         )
     if record is not None and record.suffix != ".rrd":
-        raise InvalidMission(f"is {str(record)!r}; expected a name that ends in .rrd", where="--record")
+        raise InvalidOption(f"is {str(record)!r}; expected a name that ends in .rrd", where="--record")
 
 
 def _require_seconds(where: str, value: float) -> None:
     if not LEAST_S <= value <= MOST_DEADLINE_S:
-        raise InvalidMission(f"is {value!r}; expected seconds, {LEAST_S:g} to {MOST_DEADLINE_S:g}", where=where)
+        raise InvalidOption(f"is {value!r}; expected seconds, {LEAST_S:g} to {MOST_DEADLINE_S:g}", where=where)
 
 
 def read(path: Path) -> Mission:

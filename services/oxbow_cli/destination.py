@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidOption
 from oxbow.mission.files import write_atomically
 from oxbow_cli.interrupts import ending
 
@@ -44,14 +44,14 @@ class Destination:
 
         Raises
         ------
-        InvalidMission
+        InvalidOption
             It is a folder or not a regular file, is write-protected or one of the `inputs`, or its folder is
             missing or not writable.
         """
         with writing(path):
             for other in inputs:
                 if other is not None and _same(path, other):
-                    raise InvalidMission(
+                    raise InvalidOption(
                         f"is also {str(other)!r}, which this command reads or writes; expected another file",
                         where=str(path),
                     )
@@ -63,7 +63,7 @@ class Destination:
 
         Raises
         ------
-        InvalidMission
+        InvalidOption
             It cannot be written.
         """
         with writing(self.path), ending.holding_signals():
@@ -74,7 +74,7 @@ class Destination:
 
         Raises
         ------
-        InvalidMission
+        InvalidOption
             The data is kept elsewhere; the error says why, and where.
         """
         with ending.holding_signals():
@@ -90,7 +90,7 @@ class Destination:
             problem = f"cannot be written: {error.strerror or error}"
         kept = _kept_elsewhere(self.path, data)
         where = "could not be kept anywhere" if kept is None else f"is kept in {str(kept)!r}"
-        raise InvalidMission(f"{problem}; the plan {where}", where=str(self.path))
+        raise InvalidOption(f"{problem}; the plan {where}", where=str(self.path))
 
 
 @contextmanager
@@ -99,9 +99,9 @@ def writing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise InvalidMission(f"cannot be written: {error.strerror or error}", where=str(path)) from error
+        raise InvalidOption(f"cannot be written: {error.strerror or error}", where=str(path)) from error
     except RuntimeError as error:  # raised by `Path.resolve` for a loop of links
-        raise InvalidMission("cannot be written: its symbolic links form a loop", str(path)) from error
+        raise InvalidOption("cannot be written: its symbolic links form a loop", str(path)) from error
 
 
 def _same(path: Path, other: Path) -> bool:
@@ -114,22 +114,22 @@ def _same(path: Path, other: Path) -> bool:
 def _require_place(path: Path) -> None:
     target = path.resolve()
     if target.is_dir():
-        raise InvalidMission("cannot be written: is a folder; expected the name of a file", where=str(path))
+        raise InvalidOption("cannot be written: is a folder; expected the name of a file", where=str(path))
     if not target.parent.is_dir():
-        raise InvalidMission(f"cannot be written: the folder {str(path.parent)!r} does not exist", where=str(path))
+        raise InvalidOption(f"cannot be written: the folder {str(path.parent)!r} does not exist", where=str(path))
     if target.exists():
         mode = target.stat().st_mode
         if not stat.S_ISREG(mode):
-            raise InvalidMission("cannot be written: is not a regular file", where=str(path))
+            raise InvalidOption("cannot be written: is not a regular file", where=str(path))
         if not (mode & 0o222 and os.access(target, os.W_OK)):
-            raise InvalidMission("cannot be written: is write-protected", where=str(path))
+            raise InvalidOption("cannot be written: is write-protected", where=str(path))
     # Permission bits are not enough: a file system may be read-only. An atomic write makes a new file in the same
     # folder, so that is what is tried.
     try:
         with tempfile.TemporaryFile(dir=target.parent):
             pass
     except OSError as error:
-        raise InvalidMission(
+        raise InvalidOption(
             f"cannot be written: the folder {str(path.parent)!r} cannot be written to ({error.strerror})",
             where=str(path),
         ) from error

@@ -11,18 +11,16 @@ import numpy as np
 from shapely import LineString
 
 from oxbow.contracts import Certificate, CertifyRequest, Conformance, Measures, Role, Track
-from oxbow.errors import InvalidMission, renamed
+from oxbow.errors import InvalidMission
 from oxbow.geometry.frame import Frame, Position, geodesic_length_m, lonlat
 from oxbow.mission.file import Mission
 from oxbow.mission.plan import PlanCertificate
+from oxbow.planning.field_names import FieldNames
 from oxbow.site.fleet import Member
 from oxbow.site.site import Site
 from oxbow_certificate.certify import certify
 
-__all__ = ["GIVEN_AS", "Evaluation", "VehicleEvaluation", "certify_request", "evaluate"]
-
-GIVEN_AS = {"safety_m": "Safety", "zones": "ForbiddenZones"}
-"""Names in the Mission File of fields of the certificate's request, for errors."""
+__all__ = ["Evaluation", "VehicleEvaluation", "certify_request", "evaluate"]
 
 
 class VehicleEvaluation(Conformance, frozen=True, kw_only=True):
@@ -90,7 +88,7 @@ def evaluate(mission: Mission) -> Evaluation:
     site = Site.of(mission)
     paths = list(_paths(mission, site))
     teams = [[path for path in paths if path.role is role] for role in dict.fromkeys(path.role for path in paths)]
-    with renamed(GIVEN_AS):
+    with FieldNames.of_mission(mission, site).in_errors():
         certificates = [certify(_request(mission, site, team)) for team in teams]
     vehicles = [
         _vehicle(path, conformance)
@@ -160,7 +158,6 @@ def _paths(mission: Mission, site: Site) -> Iterator[_Path]:
 
 def _request(mission: Mission, site: Site, paths: list[_Path]) -> CertifyRequest:
     """The request for one team: a survey is judged on all of the free space, a treatment on the hot spots."""
-    treats = paths[0].role is Role.SLAVE
     first, *others = (path.track for path in paths)
     return CertifyRequest(
         **msgspec.structs.asdict(first),
@@ -170,7 +167,7 @@ def _request(mission: Mission, site: Site, paths: list[_Path]) -> CertifyRequest
         safety_m=mission.safety_m,
         least_width_m=mission.least_width_m,
         variogram=mission.variogram,
-        areas=tuple(spot.area for spot in site.hot_spots) if treats else (),
+        areas=tuple(spot.area for spot in site.hot_spots) if site.team(paths[0].role).treats else (),
         danger_zones=site.danger_zones,
     )
 

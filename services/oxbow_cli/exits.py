@@ -15,6 +15,8 @@ DEBUG = "OXBOW_DEBUG"
 
 _STATUS = {
     ErrorCode.INVALID_MISSION: 2,
+    ErrorCode.INVALID_REQUEST: 2,
+    ErrorCode.INVALID_OPTION: 2,
     ErrorCode.INFEASIBLE: 3,
     ErrorCode.UNAVAILABLE: 4,
     ErrorCode.BUSY: 4,

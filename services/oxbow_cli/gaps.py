@@ -20,14 +20,14 @@ from matplotlib.figure import Figure
 from shapely import MultiPolygon, Polygon
 
 from oxbow.arrays import Place
-from oxbow.errors import renamed
 from oxbow.mission.file import Mission
+from oxbow.planning.field_names import FieldNames
 from oxbow.site.site import Site
 from oxbow_certificate.axes import Paths
 from oxbow_certificate.certify import Judgement, judge
 from oxbow_certificate.distance import PathDistance
 from oxbow_cli import sheet
-from oxbow_cli.evaluation import GIVEN_AS, certify_request
+from oxbow_cli.evaluation import certify_request
 from oxbow_cli.sheet import GAP, INK
 
 __all__ = ["GAPS", "MOST_RADII", "Unit", "draw_gaps"]
@@ -112,7 +112,7 @@ def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     sheet.checked_format(path, width_px)
     site = Site.of(mission)
     request = certify_request(mission, site)
-    with renamed(GIVEN_AS):
+    with FieldNames.of_mission(mission, site).in_errors():
         judgement = judge(request)
     unit = Unit.of(mission, judgement, treats=bool(request.areas))
     figures = _treated_figures(judgement, unit) if request.areas else _figures(judgement)

@@ -19,7 +19,7 @@ from matplotlib.lines import Line2D
 
 from oxbow.arrays import FloatArray
 from oxbow.geometry.frame import lonlat
-from oxbow.mission.file import Mission, MissionType
+from oxbow.mission.file import Mission
 from oxbow.mission.plan import PlanRecord, TreatmentRecord
 from oxbow.site.site import Site
 from oxbow_cli import sheet
@@ -74,7 +74,7 @@ def _draw(mission: Mission, site: Site, path: Path, width_px: int) -> None:
     _draw_findings(axes, mission, site)
     sheet.draw_ends(axes, site)
     sheet.draw_scale_and_north(axes)
-    sheet.draw_header(figure, mission.site_name or "Survey mission", _figures(mission))
+    sheet.draw_header(figure, mission.site_name or "Survey mission", _figures(mission, site))
     sheet.save_sheet(figure, path, width_px)
 
 
@@ -141,7 +141,7 @@ def _draw_findings(axes: Axes, mission: Mission, site: Site) -> None:
         sheet.note(axes, (place.x, place.y), f"{spot.name}: not treated", colour=GAP)
     certificate = mission.plan.certificate
     # A treatment has no such gap: every pass leaves half a swath on either side.
-    if certificate.worst_gap is not None and mission.mission_type is not MissionType.TREAT:
+    if certificate.worst_gap is not None and not site.teams[0].treats:
         x, y = site.frame.to_planar(lonlat([certificate.worst_gap]))[0]
         radius_m = certificate.cover_radius_m[0]
         sheet.draw_disc(axes, (x, y), radius_m)
@@ -176,7 +176,7 @@ def _draw_names_key(figure: Figure, names: list[str]) -> None:
         text.set_text(name)
 
 
-def _figures(mission: Mission) -> str:
+def _figures(mission: Mission, site: Site) -> str:
     """The line below the title: what is planned, how densely, and how near it is to the best possible."""
     if not mission.planned_paths:
         return "no path yet: the site alone"
@@ -185,7 +185,7 @@ def _figures(mission: Mission) -> str:
     plan = mission.plan
     dropped = f"   dropped {sheet.area_text(sum(part.area_m2 for part in plan.dropped))}" if plan.dropped else ""
     treated = "" if plan.treatment is None else f"   {_treated(plan.treatment)}"
-    if mission.mission_type is MissionType.TREAT:
+    if site.teams[0].treats:
         return f"{_paths_text(plan)}{treated}"
     return (
         f"{plan.method} {_paths_text(plan)}   spacing {sheet.distance_text(plan.spacing_m)}"

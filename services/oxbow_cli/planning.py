@@ -23,6 +23,7 @@ from oxbow.mission.file import Mission
 from oxbow.mission.files import move_into_place
 from oxbow.mission.plan import PlanOptions
 from oxbow.planning.pipeline import expected_calls, plan_mission
+from oxbow.site.site import Site
 from oxbow_cli.exits import DEBUG
 from oxbow_cli.interrupts import ending
 from oxbow_cli.local import local_call
@@ -85,8 +86,9 @@ def plan_here(job: PlanningJob) -> PlannedMission:
         There is no plan within the job's time.
     """
     with _deadline(job.timeout_s):
-        call = _Reported(local_call(), job.progress, expected_calls(job.mission))
-        planned = plan_mission(job.mission, job.options, call=call)
+        site = Site.of(job.mission)
+        call = _Reported(local_call(), job.progress, expected_calls(site))
+        planned = plan_mission(job.mission, job.options, call=call, site=site)
     job.keep(planned)
     return PlannedMission(planned)
 

@@ -25,7 +25,7 @@ from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import Place
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidMission, InvalidOption
 from oxbow.mission.files import write_atomically
 from oxbow.site.site import Site
 from oxbow_certificate.erosion import eroded_water
@@ -100,13 +100,13 @@ def checked_format(path: Path, width_px: int) -> str:
 
     Raises
     ------
-    InvalidMission
+    InvalidOption
         The suffix is neither .png nor .svg, or the width is not positive.
     """
     if path.suffix.lower() not in FORMATS:
-        raise InvalidMission(f"is {str(path)!r}; expected a name that ends in .png or .svg", where="--output")
+        raise InvalidOption(f"is {str(path)!r}; expected a name that ends in .png or .svg", where="--output")
     if width_px < 1:
-        raise InvalidMission(f"is {width_px}; expected a width of at least 1 pixel", where="width_px")
+        raise InvalidOption(f"is {width_px}; expected a width of at least 1 pixel", where="width_px")
     return FORMATS[path.suffix.lower()]
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from oxbow.bus.client import Bus
 from oxbow.contracts import STAGES
-from oxbow.errors import InvalidMission, Unavailable
+from oxbow.errors import InvalidOption, Unavailable
 from oxbow_cli.health import PERIOD_S, Health
 from oxbow_cli.interrupts import ending
 from oxbow_cli.supervisor import Child, Supervisor
@@ -47,7 +47,7 @@ class StackSettings:
 
     Raises
     ------
-    InvalidMission
+    InvalidOption
         A stage is unknown, or its number is less than 1.
     """
 
@@ -59,7 +59,7 @@ class StackSettings:
     def __post_init__(self) -> None:
         for stage, count in self.replicas.items():
             if stage not in _STAGES or count < 1:
-                raise InvalidMission(
+                raise InvalidOption(
                     f"is {stage}={count}; expected one of {', '.join(_STAGES)} and 1 or more", where="--replicas"
                 )
 

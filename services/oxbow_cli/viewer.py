@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from oxbow.contracts import checked_id
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidOption
 
 __all__ = ["find_recording", "open_recording"]
 
@@ -35,7 +35,7 @@ def find_recording(name: str, folder: Path) -> Path:
 
     Raises
     ------
-    InvalidMission
+    InvalidOption
         There is no such recording, or the name is not an ID; names some that exist.
     """
     # An id has passed `checked_id`, so that it cannot lead out of the folder; a path is the user's own.
@@ -45,10 +45,10 @@ def find_recording(name: str, folder: Path) -> Path:
             return path
         kept = sorted(file.stem for file in path.parent.glob("*.rrd") if not file.name.startswith("."))
     except OSError as error:
-        raise InvalidMission(f"cannot be read: {error.strerror}", where=name) from error
+        raise InvalidOption(f"cannot be read: {error.strerror}", where=name) from error
     others = f" and {len(kept) - MOST_NAMED} more" if len(kept) > MOST_NAMED else ""
     there = f"; there are {', '.join(kept[:MOST_NAMED])}{others}" if kept else ""
-    raise InvalidMission(f"no recording at {path}{there}", where=name)
+    raise InvalidOption(f"no recording at {path}{there}", where=name)
 
 
 def open_recording(path: Path) -> int:

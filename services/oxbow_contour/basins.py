@@ -41,7 +41,8 @@ def require_reachable(parts: Sequence[Polygon], water: Polygon, request: Contour
         spot; `where` names the place as `places[i]`.
     """
     safety_m, width_m = request.safety_m, request.least_width_m
-    narrow = f"{2 * safety_m:g} m, twice Safety" if 2 * safety_m > width_m else f"{width_m:g} m, Least_width"
+    twice_m = 2 * safety_m
+    narrow = f"{twice_m:g} m, twice `safety_m`" if twice_m > width_m else f"{width_m:g} m, `least_width_m`"
     # Without any basin there is nothing to cut off, but the way to the widest spot may still be too long for a
     # leg.
     if not is_basin(parts[0], safety_m, width_m):
@@ -56,7 +57,7 @@ def require_reachable(parts: Sequence[Polygon], water: Polygon, request: Contour
             raise Infeasible(
                 f"lies by {basin.area:.0f} m2 of free water that only water narrower than {narrow}, connects to"
                 f" the largest part, {basins[0].area:.0f} m2; expected a place by the largest part, or a smaller"
-                " Safety",
+                " `safety_m`",
                 where=f"places[{index}]",
             )
 
@@ -74,7 +75,7 @@ def _require_near(spot: Polygon, water: Polygon, request: ContourRequest, narrow
         if way_m > direct_leg_m(request.safety_m, water.distance(Point(place))):
             raise Infeasible(
                 f"is {way_m:.0f} m from the only free water, {spot.area:.2g} m2, and everything in between is"
-                f" narrower than {narrow}; expected a smaller Safety",
+                f" narrower than {narrow}; expected a smaller `safety_m`",
                 where=f"places[{index}]",
             )
 

@@ -11,7 +11,7 @@ from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import ContourRequest
-from oxbow.errors import Infeasible, InvalidMission
+from oxbow.errors import Infeasible, InvalidRequest
 from oxbow.tolerances import ON_SHORE_M, ROUNDING_M
 from oxbow_contour.verification import inscribed_radius_m
 
@@ -43,7 +43,7 @@ def home_water(waters: Sequence[Polygon], request: ContourRequest, narrows: Base
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         A place lies too far from water that is wide enough, or behind other land; `where` names it as `places[i]`.
     Infeasible
         A place lies in or by other water than the first, or by water without room for the safety distance.
@@ -59,7 +59,7 @@ def home_water(waters: Sequence[Polygon], request: ContourRequest, narrows: Base
         if water is not home:
             raise Infeasible(
                 f"lies in water of {water.area:.0f} m2 that is not connected to that of the first start,"
-                f" {home.area:.0f} m2: land, forbidden zones or water narrower than Least_width are between;"
+                f" {home.area:.0f} m2: land, forbidden zones or water narrower than `least_width_m` are between;"
                 " expected one water for all starts and recoveries",
                 where=f"places[{index}]",
             )
@@ -71,7 +71,7 @@ def _nearest(waters: Sequence[Polygon], request: ContourRequest, index: int, nar
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         It is too far away.
     Infeasible
         It has no room, and other water has.
@@ -79,9 +79,9 @@ def _nearest(waters: Sequence[Polygon], request: ContourRequest, index: int, nar
     distance_m = shapely.distance(np.array(waters, dtype=object), Point(request.places[index]))
     least_m = float(distance_m.min())
     if least_m > request.shore_tolerance_m:
-        raise InvalidMission(
-            f"lies {least_m:.3g} m from water wider than Least_width = {request.least_width_m:g} m;"
-            f" expected at most Shore_tolerance = {request.shore_tolerance_m:g} m",
+        raise InvalidRequest(
+            f"lies {least_m:.3g} m from water wider than `least_width_m` = {request.least_width_m:g} m;"
+            f" expected at most `shore_tolerance_m` = {request.shore_tolerance_m:g} m",
             where=f"places[{index}]",
         )
     nearest_first: list[int] = np.argsort(distance_m, kind="stable").tolist()
@@ -107,9 +107,9 @@ def _in_a_pocket(
     lies = "in" if distance_m <= ON_SHORE_M else f"{distance_m:.3g} m from"
     barrier = _Barrier.on(way.difference(pocket), request, narrows)
     return Infeasible(
-        f"lies {lies} water of {pocket.area:.2g} m2 that has no room for Safety = {request.safety_m:g} m, and the"
-        f" straight way to the nearest that has, {way.length:.3g} m, leads over {barrier.described}; expected a"
-        f" place in or by that water{barrier.remedy}",
+        f"lies {lies} water of {pocket.area:.2g} m2 that has no room for `safety_m` = {request.safety_m:g} m, and"
+        f" the straight way to the nearest that has, {way.length:.3g} m, leads over {barrier.described}; expected"
+        f" a place in or by that water{barrier.remedy}",
         where=f"places[{index}]",
     )
 
@@ -143,7 +143,7 @@ class _Barrier:
         parts = (
             (self.zones_m, "forbidden zone"),
             (self.land_m, "land"),
-            (self.narrows_m, f"water narrower than Least_width = {self.least_width_m:g} m"),
+            (self.narrows_m, f"water narrower than `least_width_m` = {self.least_width_m:g} m"),
         )
         named = [f"{metres:.2g} m of {what}" for metres, what in parts if metres > ROUNDING_M]
         return " and ".join(named) or "a place where land or forbidden zones meet"
@@ -152,7 +152,7 @@ class _Barrier:
     def remedy(self) -> str:
         """What would help, other than another place."""
         zones = ", or forbidden zones that leave a way there" if self.zones_m > ROUNDING_M else ""
-        return zones + (", or a smaller Least_width" if self.narrows_m > ROUNDING_M else "")
+        return zones + (", or a smaller `least_width_m`" if self.narrows_m > ROUNDING_M else "")
 
 
 def _require_no_land_between(water: Polygon, request: ContourRequest, index: int, narrows: BaseGeometry) -> None:
@@ -163,7 +163,7 @@ def _require_no_land_between(water: Polygon, request: ContourRequest, index: int
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         The way passes such a seam.
     """
     way = shapely.shortest_line(Point(request.places[index]), water)
@@ -173,10 +173,10 @@ def _require_no_land_between(water: Polygon, request: ContourRequest, index: int
     behind = shapely.union_all(land[shapely.distance(land, shapely.get_point(way, 0)) > ROUNDING_M])
     if behind.length > ON_SHORE_M:
         barrier = _Barrier.on(behind, request, seams)
-        raise InvalidMission(
-            f"lies {way.length:.3g} m from water wider than Least_width = {request.least_width_m:g} m, and behind"
-            f" a forbidden zone or other land, {barrier.described}; expected a place by that water, or a smaller"
-            " Least_width",
+        raise InvalidRequest(
+            f"lies {way.length:.3g} m from water wider than `least_width_m` = {request.least_width_m:g} m, and"
+            f" behind a forbidden zone or other land, {barrier.described}; expected a place by that water, or a"
+            " smaller `least_width_m`",
             where=f"places[{index}]",
         )
 

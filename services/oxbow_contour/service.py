@@ -49,7 +49,7 @@ def handle(request: ContourRequest, show: Show) -> FreeSpace:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         A place lies too far from any water that is wide enough.
     Infeasible
         No water is left, and the message names the largest safety distance that would leave some; or the places
@@ -137,16 +137,16 @@ def _require_breadth(parts: Sequence[Polygon], home: Polygon, request: ContourRe
     safety_m, width_m = request.safety_m, request.least_width_m
     if safety_m == 0.0:
         if not parts:
-            raise Infeasible("leaves no water wider than rounding errors", where="BoundingBox")
+            raise Infeasible("leaves no water wider than rounding errors", where="outline")
     elif not parts or is_thin(parts[0], width_m):
         radius_m = min(safety_m, inscribed_radius_m([home], EXACT * safety_m))
         # Half the least width less, so that what is left is no seam; rounded down, so that it works as it is
         # printed.
         less_m = rounded_down(max((1.0 - EXACT) * radius_m - width_m / 2, 0.0), digits=4)
-        narrow = f" wider than {width_m:g} m, Least_width" if width_m else ""
+        narrow = f" wider than {width_m:g} m, `least_width_m`" if width_m else ""
         raise Infeasible(
             f"is {safety_m:g} m, which leaves no free water{narrow}; expected less, such as {less_m:g} m",
-            where="Safety",
+            where="safety_m",
         )
 
 
@@ -168,7 +168,7 @@ def _narrow(water: MultiPolygon, opened: MultiPolygon, request: ContourRequest) 
         return ()
     lost_m2 = max(water.area - opened.area, 0.0)
     lost = f"{lost_m2:.2g} m2 in all" if lost_m2 >= LEAST_LOST_M2 else "seams without an area"
-    return (f"water narrower than Least_width = {request.least_width_m:g} m is left out: {lost}",)
+    return (f"water narrower than `least_width_m` = {request.least_width_m:g} m is left out: {lost}",)
 
 
 def _summary(dropped: tuple[DroppedPart, ...]) -> tuple[str, ...]:

@@ -40,7 +40,7 @@ def true_water(outline: Polygon, zones: Sequence[Polygon]) -> tuple[Polygon, ...
     water = outline.difference(shapely.multipolygons(land))
     parts = tuple(part for part in shapely.get_parts(water) if isinstance(part, Polygon) and part.area > 0)
     if not parts:
-        raise Infeasible("cover the whole outline and leave no water", where="ForbiddenZones")
+        raise Infeasible("cover the whole outline and leave no water", where="zones")
     return parts
 
 

@@ -17,7 +17,7 @@ import msgspec
 
 from oxbow.bus import Session
 from oxbow.contracts import MissionKey, MissionState, MissionStatus, mission_key
-from oxbow.errors import Cancelled, ErrorReply, Internal, InvalidMission, OxbowError
+from oxbow.errors import Cancelled, ErrorReply, Internal, InvalidRequest, OxbowError
 from oxbow.runtime.closing import Closing
 from oxbow_mission.fair import Order
 from oxbow_mission.store import QueuedMission, Request, Revision, Store
@@ -141,7 +141,7 @@ class Registry(Closing):
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             There is no such mission.
         """
         cause = Cancelled("was cancelled", where=f"mission {mission_id}")
@@ -154,7 +154,7 @@ class Registry(Closing):
             self._changed.notify_all()
             latest = self.statuses(mission_id)
         if not latest:
-            raise InvalidMission("is not kept here; expected a mission submitted before", where=mission_id)
+            raise InvalidRequest("is not kept here; expected a mission submitted before", where=mission_id)
         return latest[0]
 
     # ----------------------------------------------------------------- planning

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow_mission.database import Database
 from oxbow_mission.store import Store
 
@@ -38,11 +38,11 @@ class Reports:
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             There is no such mission, or the report is larger than what there is room for; nothing is kept.
         """
         if not self.store.knows(mission_id):
-            raise InvalidMission("is not kept here; expected a mission submitted before", where=mission_id)
+            raise InvalidRequest("is not kept here; expected a mission submitted before", where=mission_id)
         self._require_room(mission_id, len(payload))
         with self.database.transaction() as db:
             db.execute("INSERT INTO report VALUES (?, ?, ?)", (mission_id, time.time(), payload))
@@ -64,6 +64,6 @@ class Reports:
         )
         for what, kept, most in bounds:
             if kept + size > most:
-                raise InvalidMission(
+                raise InvalidRequest(
                     f"is {size} bytes, {kept} are kept; expected {what} to have at most {most}", where="report"
                 )

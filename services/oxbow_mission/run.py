@@ -9,7 +9,7 @@ import msgspec
 from shapely import Point
 
 from oxbow.contracts import Endpoint, Message
-from oxbow.errors import Internal, InvalidMission, OxbowError
+from oxbow.errors import Internal, InvalidInput, OxbowError
 from oxbow.mission.file import mission_json, parse_mission
 from oxbow.planning.pipeline import expected_calls, plan_mission
 from oxbow.planning.submission import SubmissionParameters
@@ -71,13 +71,13 @@ class Run:
         self.site = Site.of(self.mission)
         self.origin = (self.site.frame.lat, self.site.frame.long)
         self.seconds: dict[str, float] = {}
-        self.calls, self.expected_calls = 0, expected_calls(self.mission)
+        self.calls, self.expected_calls = 0, expected_calls(self.site)
 
     def planned(self) -> Planned:
         """The completed Mission File, with the id and the revision that it is kept under."""
         self._show(_site_layer(self.site), droppable=True)
         try:
-            mission = plan_mission(self.mission, self.parameters, call=self)
+            mission = plan_mission(self.mission, self.parameters, call=self, site=self.site)
         except OxbowError as error:
             self._show_outcome("failed", str(error))
             raise
@@ -115,7 +115,7 @@ class Run:
                 raise answer.error.error()
             try:
                 return codec.decode(answer.payload, endpoint.reply)
-            except InvalidMission as error:
+            except InvalidInput as error:
                 wrong = error
         raise Internal(f"sent an invalid reply {MOST_WRONG} times: {wrong}", where=endpoint.stage)
 

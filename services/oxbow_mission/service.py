@@ -23,7 +23,7 @@ from oxbow.contracts import (
     mission_key,
 )
 from oxbow.contracts.ids import excerpt
-from oxbow.errors import ErrorReply, Internal, InvalidMission, OxbowError, error_text
+from oxbow.errors import ErrorReply, Internal, InvalidMission, InvalidRequest, OxbowError, error_text
 from oxbow.runtime.closing import Closing
 from oxbow_mission.checks import Checks
 from oxbow_mission.incoming import PutRequest, QueriedPlan, QueriedRequest
@@ -194,14 +194,14 @@ def _after(parameters: dict[str, str]) -> int:
     """The revision after which plans are asked for."""
     text = parameters.get("after", "0")
     if not re.fullmatch(r"[0-9]{1,9}", text):
-        raise InvalidMission(f"is {excerpt(text)}; expected the number of a revision", where="after")
+        raise InvalidRequest(f"is {excerpt(text)}; expected the number of a revision", where="after")
     return int(text)
 
 
 def _require_kept(found: Sized, asked: MissionKey) -> None:
     """Say that there is nothing: no reply at all would look like no service."""
     if not found:
-        raise InvalidMission(
+        raise InvalidRequest(
             "is not kept here; expected a mission, or a revision of one, submitted before", where=str(asked)
         )
 

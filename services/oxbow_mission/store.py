@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import msgspec
 
 from oxbow.contracts import MissionState, MissionStatus, checked_id
-from oxbow.errors import ErrorCode, ErrorReply, Internal, InvalidMission, OxbowError
+from oxbow.errors import ErrorCode, ErrorReply, Internal, InvalidRequest, OxbowError
 from oxbow_mission.database import Database, Schema
 
 __all__ = ["SCHEMA", "QueuedMission", "Request", "Revision", "Store"]
@@ -365,7 +365,7 @@ class Store:
 
 def _set_aside_unfit(db: sqlite3.Connection) -> None:
     """Fail missions whose id cannot stand in a key: their outcome could not be published."""
-    cause = InvalidMission("cannot be a key on the bus", where="id")
+    cause = InvalidRequest("cannot be a key on the bus", where="id")
     for (mission_id,) in db.execute("SELECT DISTINCT mission_id FROM revision WHERE NOT announced").fetchall():
         if not _fits(mission_id):
             _log.error("mission %.200r is set aside: its id cannot be a key on the bus", mission_id)
@@ -380,14 +380,18 @@ def _fits(mission_id: str) -> bool:
     """Whether a mission's id can stand in a key."""
     try:
         checked_id(mission_id)
-    except InvalidMission:
+    except InvalidRequest:
         return False
     return True
 
 
 def _is_settled(status: MissionStatus) -> bool:
     """Whether asking again for the same would change nothing."""
-    return status.error is None or status.error.code in (ErrorCode.INVALID_MISSION, ErrorCode.INFEASIBLE)
+    return status.error is None or status.error.code in (
+        ErrorCode.INVALID_MISSION,
+        ErrorCode.INVALID_REQUEST,
+        ErrorCode.INFEASIBLE,
+    )
 
 
 def _statuses(rows: Iterable[sqlite3.Row]) -> Iterator[MissionStatus]:

@@ -12,6 +12,7 @@ from shapely import LineString
 from oxbow.contracts import Method, PathPlan, PathRequest
 from oxbow.contracts.budget import WELL_USED
 from oxbow.wire.recording import Show
+from oxbow_path.approach import joined_to_legs, within_share
 from oxbow_path.conformance import require_conforming
 from oxbow_path.course import best_plan
 from oxbow_path.dropped import dropped_parts
@@ -50,10 +51,15 @@ def handle(request: PathRequest, show: Show) -> PathPlan:
     PathPlan
         A path that keeps to the rules of `require_conforming`, and the water that it leaves far away.
     """
-    return planned_path(request, _stop(request.time_limit_s), show)
+    stop = _stop(request.time_limit_s)
+    approach = request.approach
+    if approach is None or not approach.has_legs:
+        return planned_path(request, stop, show)
+    plan = planned_path(within_share(request, approach), stop, show, spent_m=approach.legs_m)
+    return joined_to_legs(plan, request, approach)
 
 
-def planned_path(request: PathRequest, stop: Stop, show: Show) -> PathPlan:
+def planned_path(request: PathRequest, stop: Stop, show: Show, spent_m: float = 0.0) -> PathPlan:
     """Plan as `handle` does, with a clock of the caller's.
 
     Parameters
@@ -77,7 +83,7 @@ def planned_path(request: PathRequest, stop: Stop, show: Show) -> PathPlan:
     Internal
         The path broke a rule: a fault of the planner.
     """
-    task = Task.of(request, stop)
+    task = Task.of(request, stop, spent_m)
     display = Display(show, request.decomposition.heading_rad)
     plan = best_plan(METHODS[request.method], task, display)
     claimed_m = min(plan.spacing_m, WIDEST * task.spacing_m)
@@ -125,7 +131,7 @@ def _length_warnings(plan: MethodPlan, task: Task) -> Iterator[str]:
     share = plan.path.length / request.length_m
     if share < WELL_USED:
         if plan.spacing_m <= request.min_spacing_m:
-            reason = f"Minimal_spatial_rate keeps the spacing at {request.min_spacing_m:g} m"
+            reason = f"`min_spacing_m` keeps the spacing at {request.min_spacing_m:g} m"
         elif min(plan.spacing_m, task.spacing_m) <= finest_spacing_m(request.space):
             finest_m = finest_spacing_m(request.space)
             reason = f"no spacing below {finest_m:.2g} m is planned in water of this size and shore"

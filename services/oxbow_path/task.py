@@ -81,7 +81,7 @@ class Task:
     stop: Stop
 
     @classmethod
-    def of(cls, request: PathRequest, stop: Stop) -> Task:
+    def of(cls, request: PathRequest, stop: Stop, spent_m: float = 0.0) -> Task:
         """Turn a request into the sweep frame, and prepare what all methods share.
 
         Parameters
@@ -90,6 +90,8 @@ class Task:
             What is asked, in the planar frame.
         stop
             Whether time is up.
+        spent_m
+            What the vehicle needs besides the path; refusals count it in.
 
         Returns
         -------
@@ -104,7 +106,7 @@ class Task:
         least_spacing_m = max(request.min_spacing_m, finest_spacing_m(request.space))
         nominal_m = nominal_spacing_m(request.space.free.area, request.length_m, least_spacing_m)
         waters = prepared_waters(request, nominal_m)
-        return cls(request, waters, Budget(request.length_m, least_spacing_m, request.spent_m), stop)
+        return cls(request, waters, Budget(request.length_m, least_spacing_m, spent_m), stop)
 
     @property
     def spacing_m(self) -> float:
@@ -269,6 +271,6 @@ def prepared_waters(request: PathRequest, spacing_m: float) -> Waters:
         # Routes as fine as the probe; in canals, whose shore is long for their area, no finer than the gates
         # allow.
         routes=Routes(free, max(PROBE_PITCH * spacing_m, free.length / GATES_ALONG)),
-        launch=access(tuple(launch), free, shore, where="LaunchPoint"),
-        recovery=access(tuple(recovery), free, shore, where="RecoveryPoint"),
+        launch=access(tuple(launch), free, shore, where="launch"),
+        recovery=access(tuple(recovery), free, shore, where="recovery"),
     )

@@ -14,7 +14,7 @@ import platformdirs
 
 from oxbow.bus import DEFAULT_ENDPOINT, Session
 from oxbow.contracts import ANY_LAYER, live_key
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.runtime.lifetime import Lifetime
 from oxbow_recorder.files import sweep
 from oxbow_recorder.live import LiveServer
@@ -53,7 +53,7 @@ def main(argv: list[str] | None = None) -> None:
 def _record(runs: Runs, key: str, payload: bytes) -> None:
     try:
         runs.take(key, payload)
-    except InvalidMission as error:
+    except InvalidRequest as error:
         _log.warning("a layer on %s is not recorded: %s", key[:_MOST_LOGGED], str(error)[:_MOST_LOGGED])
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from oxbow.contracts import checked_id, layer_key
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 
 __all__ = ["MOST_LAYER_BYTES", "Address", "RecordedRun", "address_of"]
 
@@ -64,19 +64,19 @@ def address_of(key: str, payload: bytes) -> Address:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         It is no such message or too large, one of its ids is not valid, or the key does not match the message.
     """
     # Before it is decoded, on the thread that all layers pass through.
     if len(payload) > MOST_LAYER_BYTES:
-        raise InvalidMission(f"is {len(payload)} bytes; expected at most {MOST_LAYER_BYTES}", where="layer")
+        raise InvalidRequest(f"is {len(payload)} bytes; expected at most {MOST_LAYER_BYTES}", where="layer")
     try:
         stamp = msgspec.msgpack.decode(payload, type=_Stamp)
     except (ValueError, RecursionError) as error:  # UnicodeDecodeError is a ValueError, but no DecodeError
-        raise InvalidMission(f"is not a layer: {error}", where="layer") from error
+        raise InvalidRequest(f"is not a layer: {error}", where="layer") from error
     run = RecordedRun(mission_id=stamp.mission_id, run_id=stamp.request_id or "run")
     own_key = layer_key(stamp.mission_id, stamp.layer.stage, stamp.layer.name)
     # Whoever may publish on one key only must not be able to write into the recording of another mission.
     if key != own_key:
-        raise InvalidMission(f"was put on a key other than its own, {own_key}", where="layer")
+        raise InvalidRequest(f"was put on a key other than its own, {own_key}", where="layer")
     return Address(run=run, is_last=(stamp.layer.stage, stamp.layer.name) in _END)

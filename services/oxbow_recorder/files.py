@@ -8,7 +8,7 @@ import re
 import time
 from pathlib import Path
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow_recorder.address import RecordedRun
 
 __all__ = ["holds", "part_path", "recording_id", "recording_path", "sweep"]
@@ -40,7 +40,7 @@ def recording_path(folder: Path, run: RecordedRun) -> Path:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         The mission's id would lead out of the folder.
     """
     return _within(folder, f"{run.mission_id}.rrd")
@@ -63,7 +63,7 @@ def part_path(folder: Path, run: RecordedRun) -> Path:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         The mission's id would lead out of the folder.
     """
     # Names of files are limited to 255 bytes: two ids of 128 characters are too long for one.
@@ -102,7 +102,7 @@ def _within(folder: Path, name: str) -> Path:
     path = folder / name
     # Ids are checked where they come in; this is the last line, next to the file system.
     if path.parent.resolve() != folder.resolve():
-        raise InvalidMission(f"is {name!r}; expected the name of a file", where="recording")
+        raise InvalidRequest(f"is {name!r}; expected the name of a file", where="recording")
     return path
 
 

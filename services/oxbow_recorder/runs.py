@@ -117,7 +117,7 @@ class Runs(Closing):
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             It is no layer, or not of this key (`oxbow_recorder.address`).
         """
         address = address_of(key, payload)

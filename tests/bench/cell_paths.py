@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import dijkstra
 from shapely import LineString
 
 from oxbow.arrays import Indices, Mask
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow_assignment.shares.mesh import Mesh, Wavefront, propagate
 
 __all__ = ["CellPath", "coverage_depth", "shortest_path", "watershed_path"]
@@ -99,12 +99,12 @@ def watershed_path(mesh: Mesh, start: int, within: Mask | None = None) -> CellPa
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         The start is not in the share, or the share does not hang together.
     """
     own = np.ones(len(mesh), dtype=bool) if within is None else within
     if not own[start]:
-        raise InvalidMission(f"is triangle {start}; expected one of the share", where="start")
+        raise InvalidRequest(f"is triangle {start}; expected one of the share", where="start")
     order = list(_nearest_first(mesh, coverage_depth(mesh, own), start))
     graph = _within(mesh.graph, own)
     cells = [start]
@@ -149,7 +149,7 @@ def _way(mesh: Mesh, graph: csr_array[np.float64], start: int, goal: int) -> lis
         if np.isfinite(distance[goal]):
             break
         if limit_m > most_m:
-            raise InvalidMission(f"leaves triangle {goal} out of reach of triangle {start}", where="within")
+            raise InvalidRequest(f"leaves triangle {goal} out of reach of triangle {start}", where="within")
         limit_m *= 4
     way = [goal]
     while previous[way[-1]] != start:
@@ -172,11 +172,11 @@ def shortest_path(mesh: Mesh, waves: Wavefront, goal: int) -> CellPath:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         No wave reached the goal.
     """
     if waves.depth[goal] < 0:
-        raise InvalidMission(f"is triangle {goal}, which no wavefront reached", where="goal")
+        raise InvalidRequest(f"is triangle {goal}, which no wavefront reached", where="goal")
     start = int(np.flatnonzero((waves.source == waves.source[goal]) & (waves.depth == 0))[0])
     from_start_m = np.hypot(*(mesh.centroids - mesh.centroids[start]).T)
     cells = [goal]

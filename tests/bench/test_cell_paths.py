@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import box
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow_assignment.shares.mesh import Mesh, mesh_area, propagate
 from tests.bench.cell_paths import CellPath, coverage_depth, shortest_path, watershed_path
 from tests.support.path_requests import lake
@@ -76,14 +76,14 @@ def test_a_start_outside_the_share_is_named():
     mesh = mesh_area(box(0, 0, 100, 100), 20.0)
     own = np.ones(len(mesh), dtype=bool)
     own[3] = False
-    with pytest.raises(InvalidMission, match="start: is triangle 3"):
+    with pytest.raises(InvalidRequest, match="start: is triangle 3"):
         watershed_path(mesh, 3, own)
 
 
 def test_a_share_in_two_pieces_is_named():
     mesh = mesh_area(box(0, 0, 300, 20), 15.0)
     ends = np.abs(mesh.centroids[:, 0] - 150) > 100
-    with pytest.raises(InvalidMission, match="within: leaves triangle"):
+    with pytest.raises(InvalidRequest, match="within: leaves triangle"):
         watershed_path(mesh, int(np.flatnonzero(ends)[0]), ends)
 
 
@@ -108,5 +108,5 @@ def test_the_shortest_path_has_the_fewest_steps_of_all(seed, starts):
 def test_a_goal_that_no_wave_reached_is_named():
     mesh = mesh_area(box(0, 0, 100, 100), 20.0)
     waves = propagate(mesh, [0], np.arange(len(mesh)) == 0)
-    with pytest.raises(InvalidMission, match="goal: is triangle 1"):
+    with pytest.raises(InvalidRequest, match="goal: is triangle 1"):
         shortest_path(mesh, waves, 1)

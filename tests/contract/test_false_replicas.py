@@ -15,7 +15,7 @@ from oxbow.bus.client import Bus, BusCall
 from oxbow.bus.query import MSGPACK, Query
 from oxbow.bus.router import RouterProcess
 from oxbow.contracts import Endpoint
-from oxbow.errors import ErrorCode, ErrorReply, Infeasible, Internal, InvalidMission
+from oxbow.errors import ErrorCode, ErrorReply, Infeasible, Internal, InvalidOption, InvalidRequest
 from oxbow.wire import codec
 from oxbow.wire.envelope import StageError
 from tests.support.bus_processes import end, launch, wait_until
@@ -179,7 +179,7 @@ def test_an_answerer_that_raises_anything_answers_and_goes_on(
 
 @pytest.mark.parametrize("timeout_s", [float("nan"), float("inf"), 1e308, 3e6, -1.0])
 def test_a_wait_that_is_none_is_refused(bus: Bus, timeout_s: float) -> None:
-    with pytest.raises(InvalidMission, match=r"timeout_s: is .*; expected 0 to 604800 s"):
+    with pytest.raises(InvalidOption, match=r"timeout_s: is .*; expected 0 to 604800 s"):
         bus.query("test/none", timeout_s=timeout_s)
 
 
@@ -193,6 +193,6 @@ def test_a_key_that_zenoh_would_panic_at_is_refused(bus: Bus, key: str) -> None:
         lambda: bus.subscribe(key, lambda _key, _payload: None),
         lambda: bus.answer(key, lambda _key, _parameters, _payload: []),
     ):
-        with pytest.raises(InvalidMission, match=r"key: is 'test/.*expected at most 4096 bytes of Unicode"):
+        with pytest.raises(InvalidRequest, match=r"key: is 'test/.*expected at most 4096 bytes of Unicode"):
             use()
     assert bus.query("test/none", timeout_s=1.0, may_be_empty=True) == []

@@ -25,7 +25,7 @@ from oxbow.contracts import (
     Vehicle,
     WeightedArea,
 )
-from oxbow.errors import Infeasible, InvalidMission
+from oxbow.errors import Infeasible, InvalidRequest
 from oxbow.wire import codec
 from oxbow.wire.recording import discard
 from oxbow_cli.local import local_call
@@ -98,7 +98,7 @@ def test_a_mutated_message_is_one_or_is_refused(exchanges: list[Exchange]) -> No
         kind, message = chance.choice(messages)
         try:
             codec.decode(mutated(message, chance), kind)
-        except InvalidMission as error:
+        except InvalidRequest as error:
             refused += 1
             assert error.where
     assert refused > 2_500
@@ -112,7 +112,7 @@ def test_a_stage_plans_a_mutated_request_or_says_what_is_wrong(exchanges: list[E
         try:
             request = codec.decode(mutated(exchange.request, chance), exchange.endpoint.request)
             codec.encode(call.handlers[exchange.endpoint.stage](request, discard))
-        except (InvalidMission, Infeasible):
+        except (InvalidRequest, Infeasible):
             continue
         planned += 1
     assert planned > 12

@@ -15,7 +15,7 @@ import pytest
 from oxbow.bus.client import Bus, BusCall
 from oxbow.bus.router import RouterProcess, free_endpoint, start_router
 from oxbow.contracts import ANY_LAYER, live_key
-from oxbow.errors import Busy, DeadlineExceeded, Infeasible, Internal, InvalidMission, Unavailable
+from oxbow.errors import Busy, DeadlineExceeded, Infeasible, Internal, InvalidOption, Unavailable
 from tests.support.bus_processes import end, launch, run_python, wait_gone, wait_until
 from tests.support.echo_stage import ECHO, SQUARE, Deed, EchoRequest
 
@@ -170,7 +170,7 @@ def test_connecting_to_nothing_names_the_endpoint() -> None:
 
 def test_an_endpoint_without_a_protocol_is_refused() -> None:
     with pytest.raises(
-        InvalidMission, match=r"endpoint: is 'localhost:7447'; expected PROTOCOL/ADDRESS, such as tcp/"
+        InvalidOption, match=r"endpoint: is 'localhost:7447'; expected PROTOCOL/ADDRESS, such as tcp/"
     ):
         Bus.connect("localhost:7447")
 

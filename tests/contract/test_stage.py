@@ -19,7 +19,7 @@ from oxbow.bus import Envelope
 from oxbow.bus.client import Bus, BusCall
 from oxbow.bus.router import RouterProcess
 from oxbow.contracts import INTROSPECTION, MAX_REQUEST_BYTES, any_introspection_key
-from oxbow.errors import Busy, DeadlineExceeded, Infeasible, Internal, InvalidMission, OxbowError, Unavailable
+from oxbow.errors import Busy, DeadlineExceeded, Infeasible, Internal, InvalidRequest, OxbowError, Unavailable
 from oxbow.stage import serve_stage
 from oxbow.wire import codec
 from oxbow.wire.introspection import Info, Ping, Stats
@@ -207,7 +207,7 @@ def test_a_replica_tells_about_itself(start_replicas: StartReplicas, bus: Bus, c
 
 def test_what_is_too_large_is_refused_by_size(start_replicas: StartReplicas, call: BusCall) -> None:
     start_replicas()
-    with pytest.raises(InvalidMission, match=rf"echo: is \d+ bytes; at most {MAX_REQUEST_BYTES}"):
+    with pytest.raises(InvalidRequest, match=rf"echo: is \d+ bytes; at most {MAX_REQUEST_BYTES}"):
         call(ECHO, EchoRequest(text="x" * (MAX_REQUEST_BYTES + 1), shape=SQUARE))
     with pytest.raises(Internal, match=rf"the reply is \d+ bytes; at most {MAX_REQUEST_BYTES}"):
         call(ECHO, EchoRequest(shape=SQUARE, deed=Deed.BLOAT))
@@ -230,7 +230,7 @@ ODD_ATTACHMENTS = [
 def test_every_query_has_an_answer(start_replicas: StartReplicas, bus: Bus) -> None:
     start_replicas()
     for attachment, message in ODD_ATTACHMENTS:
-        with pytest.raises(InvalidMission, match=message):
+        with pytest.raises(InvalidRequest, match=message):
             bus.query(ECHO.instance_key("r0"), b"garbage", timeout_s=5.0, attachment=attachment)
 
 
@@ -238,7 +238,7 @@ def test_a_key_that_is_none_is_answered_by_those_that_are(start_replicas: StartR
     start_replicas()
     key = ECHO.instance_key("r0")
     for unknown in ("ping", "a/b"):
-        with pytest.raises(InvalidMission, match=rf"key: is '{key}/{unknown}'; expected {key}, {key}/@ping"):
+        with pytest.raises(InvalidRequest, match=rf"key: is '{key}/{unknown}'; expected {key}, {key}/@ping"):
             bus.query(f"{key}/{unknown}", timeout_s=5.0)
 
 
@@ -255,7 +255,7 @@ def test_another_request_under_an_id_that_is_taken_gets_no_answer_of_it(
         assert isinstance(first.result(), bytes)
     afterwards = ask(bus, EchoRequest(text="third", shape=SQUARE), same)
     for refused in (while_at_work, afterwards):
-        assert isinstance(refused, InvalidMission)
+        assert isinstance(refused, InvalidRequest)
         assert "the id of another request" in refused.message
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from shapely import Polygon, box
 
 from oxbow.contracts import Assignment, AssignRequest, ContourRequest, HotSpot
-from oxbow.errors import Infeasible, InvalidMission
+from oxbow.errors import Infeasible, InvalidRequest
 from oxbow.geometry.route import RouteMethod
 from oxbow.mission.file import read_mission
 from oxbow.site.site import Site
@@ -276,12 +276,12 @@ OVERLAPPING = (*SPOTS, HotSpot(name="more", area=box(250, 400, 350, 450), value=
 @pytest.mark.parametrize(
     ("changes", "error", "message"),
     [
-        ({"hot_spots": OVERLAPPING}, InvalidMission, "hot spots 'north' and 'more' overlap in 2500 m2"),
-        ({"hot_spots": SPOTS + SPOTS[:1]}, InvalidMission, "hot_spots: has 'north' 2 times"),
-        ({"hot_spots": (replaced(SPOTS[0], value=-1.0),)}, InvalidMission, "value: of hot spot 'north' is -1"),
-        ({"vehicles": FLEET[2:]}, InvalidMission, "vehicles: has no slave"),
-        ({"vehicles": FLEET[:2], "share_free": True}, InvalidMission, "vehicles: has no master"),
-        ({"swath_m": 1e-4}, InvalidMission, r"swath_m: is 0.0001 m: hot spot 'north' would take"),
+        ({"hot_spots": OVERLAPPING}, InvalidRequest, "hot spots 'north' and 'more' overlap in 2500 m2"),
+        ({"hot_spots": SPOTS + SPOTS[:1]}, InvalidRequest, "hot_spots: has 'north' 2 times"),
+        ({"hot_spots": (replaced(SPOTS[0], value=-1.0),)}, InvalidRequest, "value: of hot spot 'north' is -1"),
+        ({"vehicles": FLEET[2:]}, InvalidRequest, "vehicles: has no slave"),
+        ({"vehicles": FLEET[:2], "share_free": True}, InvalidRequest, "vehicles: has no master"),
+        ({"swath_m": 1e-4}, InvalidRequest, r"swath_m: is 0.0001 m: hot spot 'north' would take"),
         (
             {"vehicles": (slave((-600.0, 0.0), length_m=1_100.0),)},
             Infeasible,
@@ -289,7 +289,7 @@ OVERLAPPING = (*SPOTS, HotSpot(name="more", area=box(250, 400, 350, 450), value=
         ),
         (
             {"vehicles": (*FLEET, master((0.0, 0.0), name="four")), "share_free": True, "footprint_m": 0.1},
-            InvalidMission,
+            InvalidRequest,
             r"footprint_m: is 0.1 m; for this water expected 2\.\d+ m or more",
         ),
     ],

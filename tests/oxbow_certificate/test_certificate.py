@@ -269,5 +269,5 @@ def test_hot_spots_are_judged_in_place_of_the_whole_water():
     assert judged.free_area_m2 == pytest.approx(400 + 900)
     assert judged.judged_area == pytest.approx(400 / 1300)
     assert judged.cover_radius_m[1] < 4
-    with pytest.raises(Infeasible, match="Safety"):
+    with pytest.raises(Infeasible, match="safety_m"):
         certified(passes, safety_m=12.0, areas=(box(0, 0, 9, 9),))

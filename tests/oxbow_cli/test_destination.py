@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidOption
 from oxbow_cli.destination import Destination
 from oxbow_cli.planning import _kept_recording
 from oxbow_cli.scratch import scratch_folder
@@ -54,7 +54,7 @@ def test_an_edit_made_meanwhile_stays_and_the_plan_is_kept_beside_it(lake, there
     first, second = Destination.of(lake), Destination.of(lake)
     lake.write_bytes(b"edited")
     for destination, name in ((first, "lake.planned.json"), (second, "lake.planned-2.json")):
-        with pytest.raises(InvalidMission, match="changed in the meantime") as caught:
+        with pytest.raises(InvalidOption, match="changed in the meantime") as caught:
             destination.keep(PLAN)
         assert f"kept in {str(lake.with_name(name))!r}" in str(caught.value)
         assert lake.with_name(name).read_bytes() == PLAN
@@ -64,7 +64,7 @@ def test_an_edit_made_meanwhile_stays_and_the_plan_is_kept_beside_it(lake, there
 def test_a_removed_file_is_not_made_again(lake):
     destination = Destination.of(lake)
     lake.unlink()
-    with pytest.raises(InvalidMission, match=r"lake\.planned\.json"):
+    with pytest.raises(InvalidOption, match=r"lake\.planned\.json"):
         destination.keep(PLAN)
     assert not lake.exists()
 
@@ -73,7 +73,7 @@ def test_a_plan_whose_folder_is_gone_is_kept_among_the_temporary_files(lake, tem
     destination = Destination.of(lake)
     lake.unlink()
     lake.parent.rmdir()
-    with pytest.raises(InvalidMission, match="kept in") as caught:
+    with pytest.raises(InvalidOption, match="kept in") as caught:
         destination.keep(PLAN)
     assert (temporary / "lake.planned.json").read_bytes() == PLAN
     assert str(temporary / "lake.planned.json") in str(caught.value)
@@ -84,7 +84,7 @@ def test_a_plan_that_fits_nowhere_leaves_nothing_half_written(lake, temporary):
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (4_096, before[1]))
     try:
-        with pytest.raises(InvalidMission, match="File too large; the plan could not be kept anywhere"):
+        with pytest.raises(InvalidOption, match="File too large; the plan could not be kept anywhere"):
             destination.keep(b"x" * 10_000)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from oxbow.contracts import Conformance, Role
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidMission, InvalidOption
 from oxbow.mission.file import mission_json, parse_mission, read_mission
 from oxbow.mission.plan import FleetRecord, PlanOptions, VehicleRecord
 from oxbow.planning.pipeline import plan_mission
@@ -141,6 +141,6 @@ def test_a_plan_of_an_earlier_version_is_still_read(planned, tmp_path):
 
 @pytest.mark.parametrize("name", ["plan.jpg", "plan"])
 def test_another_format_is_refused(planned, tmp_path, name):
-    with pytest.raises(InvalidMission, match=r"\.png or \.svg"):
+    with pytest.raises(InvalidOption, match=r"\.png or \.svg"):
         draw(planned, tmp_path / name)
     assert not list(tmp_path.iterdir())

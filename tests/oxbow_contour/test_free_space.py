@@ -150,7 +150,7 @@ def test_the_safety_distance_named_when_infeasible_leaves_water(site, safety_m):
     try:
         free_space(outline, zones, safety_m, 20.0)
     except Infeasible as error:
-        if error.where != "Safety":
+        if error.where != "safety_m":
             return
         assert f"{safety_m:g}" in error.message
         named_m = float(error.message.split("such as ")[1].split(" m")[0])
@@ -161,14 +161,14 @@ def test_the_safety_distance_named_when_infeasible_leaves_water(site, safety_m):
 def test_the_safety_distance_named_is_nearly_the_largest():
     with pytest.raises(Infeasible, match=r"such as 49\.9") as raised:
         free_space(SQUARE, safety_m=51.0)
-    assert raised.value.where == "Safety"
+    assert raised.value.where == "safety_m"
 
 
 @pytest.mark.parametrize(
     "zones", [[box(-1, -1, 101, 101)], [SQUARE], [box(0, 0, 60, 100), box(50, 0, 100, 100)]], ids=str
 )
 def test_zones_that_cover_everything_are_infeasible(zones):
-    with pytest.raises(Infeasible, match="ForbiddenZones"):
+    with pytest.raises(Infeasible, match="zones"):
         free_space(SQUARE, zones)
 
 
@@ -344,7 +344,7 @@ def test_too_large_a_safety_distance_is_refused_with_one_that_leaves_water():
     water = box(0, 0, 500.1, 800)
     with pytest.raises(Infeasible, match=r"251 m, which leaves no free water; .* such as 250 m") as caught:
         free_space(water, safety_m=251)
-    assert caught.value.where == "Safety"
+    assert caught.value.where == "safety_m"
     assert free_space(water, safety_m=250).free.area > 0
 
 
@@ -357,7 +357,7 @@ def test_a_seam_of_free_water_is_refused_with_a_safety_distance_that_leaves_more
         Infeasible, match=r"4.999 m, which leaves no free water wider than .* such as 4.948"
     ) as caught:
         handle(asked, discard)
-    assert caught.value.where == "Safety"
+    assert caught.value.where == "safety_m"
     assert handle(structs.replace(asked, safety_m=4.948), discard).free.area == pytest.approx(61, rel=0.05)
 
 
@@ -366,6 +366,6 @@ def test_a_wide_spot_is_no_water_to_be_reached_from_far_up_a_narrow_canal():
     near, far = ((375.0, 5.0),), ((5.0, 5.0),)
     asked = ContourRequest(outline=canal, safety_m=5.0, spacing_m=10.0, least_width_m=0.1, places=near)
     assert handle(asked, discard).free.area < 2
-    with pytest.raises(Infeasible, match=r"from the only free water.* than 10 m, twice Safety") as caught:
+    with pytest.raises(Infeasible, match=r"from the only free water.* than 10 m, twice `safety_m`") as caught:
         handle(structs.replace(asked, places=far), discard)
     assert caught.value.where == "places[0]"

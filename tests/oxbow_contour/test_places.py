@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from shapely import MultiPolygon, Point, Polygon, box
 
 from oxbow.contracts import ContourRequest, FreeSpace
-from oxbow.errors import Infeasible, InvalidMission
+from oxbow.errors import Infeasible, InvalidRequest
 from oxbow.geometry.narrows import is_basin, without_narrows
 from oxbow.wire.recording import discard
 from oxbow_contour.service import handle
@@ -51,7 +51,7 @@ def with_mouth(width_m):
         (
             (6.5, 50.04),
             [ROUND_A_POCKET],
-            r"in water of 40 m2 .* Safety = 4 m, .* 2.5 m, leads over 1 m of forbidden zone",
+            r"in water of 40 m2 .* `safety_m` = 4 m, .* 2.5 m, leads over 1 m of forbidden zone",
         ),
         ((8.4, 50.0), [ROUND_A_POCKET], r"0.4 m from water of 40 m2 .* 0.6 m, leads over 0.6 m of forbidden zone"),
         ((-1.0, 50.0), [ROUND_A_POCKET], r"1 m from water of 40 m2 .* leads over .* m of land"),
@@ -59,7 +59,7 @@ def with_mouth(width_m):
         (
             (6.5, 50.04),
             with_mouth(0.08),
-            r"in water of 40 m2 .* leads over 0.89 m of water narrower than Least_width = 0.1",
+            r"in water of 40 m2 .* leads over 0.89 m of water narrower than `least_width_m` = 0.1",
         ),
         ((5.0, 49.0), with_mouth(0.08), r"in water of 40 m2 .* leads over 1 m of forbidden zone"),
     ],
@@ -79,7 +79,7 @@ def test_a_pocket_with_a_mouth_wide_enough_is_left_by_it():
 def test_other_seams_do_not_make_a_narrow_mouth_water():
     """They are as many waters as the mouth parts."""
     seam = Polygon([(20, -1), (80, -1), (80, 2), (20, 2)]) - box(25, -2, 75, 0.02)
-    with pytest.raises(Infeasible, match=r"narrower than Least_width"):
+    with pytest.raises(Infeasible, match=r"narrower than `least_width_m`"):
         space((6.0, 50.04), zones=[*with_mouth(0.08), seam], least_width_m=0.1)
 
 
@@ -88,7 +88,7 @@ def test_of_waters_that_meet_at_the_place_the_one_with_room_is_planned_on():
 
 
 def test_without_room_anywhere_the_safety_distance_is_named():
-    with pytest.raises(Infeasible, match=r"Safety: is 60 m, which leaves no free water"):
+    with pytest.raises(Infeasible, match=r"safety_m: is 60 m, which leaves no free water"):
         space((4.0, 50.0), zones=[ROUND_A_POCKET], safety_m=60.0)
 
 
@@ -112,7 +112,9 @@ def test_a_basin_is_looked_for_along_the_water():
 
 def test_a_place_too_far_from_wide_water_is_refused():
     ditch = SQUARE | box(-60, 50, 0, 50.05)
-    with pytest.raises(InvalidMission, match=r"places\[0\]: lies 50 m from water wider than Least_width = 0.1 m"):
+    with pytest.raises(
+        InvalidRequest, match=r"places\[0\]: lies 50 m from water wider than `least_width_m` = 0.1 m"
+    ):
         space((-50.0, 50.02), outline=ditch, least_width_m=0.1)
     assert space((-20.0, 50.02), outline=ditch, least_width_m=0.1).water.bounds[0] == pytest.approx(0, abs=0.05)
 
@@ -121,7 +123,7 @@ def test_a_place_too_far_from_wide_water_is_refused():
 @pytest.mark.parametrize("x", [-2.0, 0.01], ids=["ashore", "in the seam"])
 def test_a_place_behind_a_zone_that_leaves_a_seam_is_refused(safety_m, x):
     wall = box(0.02, 20, 10, 80)
-    with pytest.raises(InvalidMission, match=r"places\[0\]: lies .* behind a forbidden zone or other land"):
+    with pytest.raises(InvalidRequest, match=r"places\[0\]: lies .* behind a forbidden zone or other land"):
         space((x, 50.0), zones=[wall], safety_m=safety_m, least_width_m=0.1)
     assert space((x, 19.0), zones=[wall], safety_m=safety_m, least_width_m=0.1).water.area > 9_300
 
@@ -148,7 +150,7 @@ def test_narrow_water_is_named_and_the_rest_stays_as_it_is():
     spike = shapely.union_all([SQUARE, Polygon([(100, 50), (300, 50.0005), (100, 50.001)])])
     found = space((10.0, 50.0), outline=spike, safety_m=0.0, least_width_m=0.1)
     assert found.free.bounds[2] < 100.1
-    assert any("narrower than Least_width = 0.1 m" in text for text in found.warnings)
+    assert any("narrower than `least_width_m` = 0.1 m" in text for text in found.warnings)
     corners = {tuple(xy) for xy in shapely.get_coordinates(found.water)}
     assert {(0.0, 0.0), (100.0, 0.0), (100.0, 100.0), (0.0, 100.0)} <= corners
 

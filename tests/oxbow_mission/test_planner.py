@@ -78,8 +78,8 @@ def accept(registry: Registry, mission_id: str, document: str, deadline_s: float
         ("raises", ErrorCode.INTERNAL, "out of the blue"),
         ("answers for another", ErrorCode.INTERNAL, "answered Checked"),
         ("asks for no stage", ErrorCode.INTERNAL, "none"),
-        ("asks nonsense", ErrorCode.INVALID_MISSION, ""),
-        ("shows what is no layer", ErrorCode.INVALID_MISSION, "expected 1 to 128"),
+        ("asks nonsense", ErrorCode.INVALID_REQUEST, ""),
+        ("shows what is no layer", ErrorCode.INVALID_REQUEST, "expected 1 to 128"),
     ],
 )
 def test_each_mission_has_its_own_outcome_whatever_the_one_before_did(

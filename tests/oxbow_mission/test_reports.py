@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow_mission import reports as bounds
 from oxbow_mission.database import Database
 from oxbow_mission.reports import Reports
@@ -33,7 +33,7 @@ def test_reports_are_kept_in_order(database: Database) -> None:
 
 def test_nothing_is_kept_of_a_mission_that_is_not_known(database: Database) -> None:
     reports = Reports(database, Store(database))
-    with pytest.raises(InvalidMission, match="pond: is not kept here"):
+    with pytest.raises(InvalidRequest, match="pond: is not kept here"):
         reports.add("pond", b"1")
     assert reports.of("pond") == []
 
@@ -45,11 +45,11 @@ def test_what_is_beyond_a_bound_is_refused_and_the_bound_is_named(
         monkeypatch.setattr(bounds, name, most)
     Reports(database, Store(database)).add("lake", b"1234")
     reports = Reports(database, Store(database))  # what is kept already counts
-    with pytest.raises(InvalidMission, match="a report to have at most 4"):
+    with pytest.raises(InvalidRequest, match="a report to have at most 4"):
         reports.add("sea", b"12345")
-    with pytest.raises(InvalidMission, match="all reports of a mission to have at most 6"):
+    with pytest.raises(InvalidRequest, match="all reports of a mission to have at most 6"):
         reports.add("lake", b"123")
     reports.add("sea", b"1234")
-    with pytest.raises(InvalidMission, match="is 2 bytes, 8 are kept; expected all reports to have at most 9"):
+    with pytest.raises(InvalidRequest, match="is 2 bytes, 8 are kept; expected all reports to have at most 9"):
         reports.add("sea", b"12")
     assert reports.of("lake") + reports.of("sea") == [b"1234", b"1234"]

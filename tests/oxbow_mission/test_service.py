@@ -15,7 +15,7 @@ import pytest
 from oxbow import Client
 from oxbow.bus.client import Bus
 from oxbow.contracts import PLAN_KEY, MissionState, MissionStatus, mission_key
-from oxbow.errors import DeadlineExceeded, ErrorCode, Infeasible, Internal, InvalidMission
+from oxbow.errors import DeadlineExceeded, ErrorCode, Infeasible, Internal, InvalidMission, InvalidRequest
 from oxbow.mission.file import parse_mission
 from oxbow.wire import codec
 from oxbow.wire.introspection import Info, Ping, Stats
@@ -158,7 +158,7 @@ def test_an_invalid_mission_is_refused_by_query_and_by_put(
     with pytest.raises(InvalidMission, match=message):
         raise status.error.error()
     assert status.revision == 0
-    with pytest.raises(InvalidMission, match="not kept"):
+    with pytest.raises(InvalidRequest, match="not kept"):
         client.status("invalid")
 
 
@@ -191,13 +191,13 @@ def test_an_id_that_cannot_be_kept_is_answered_under_its_encoded_form(client: Cl
             bus.publish(f"oxbow/v1/mission/{bad_id}/request", mission_file())
         keys = {samples.get(timeout=WAIT_S)[0] for _ in range(2)}
     assert keys == {"oxbow/v1/mission/my%20lake/status", "oxbow/v1/mission/%2A/status"}
-    with pytest.raises(InvalidMission, match="id: is 'my lake'"):
+    with pytest.raises(InvalidRequest, match="id: is 'my lake'"):
         client.submit(mission_file(), mission_id="my lake")
 
 
 def test_unknown_parameters_are_refused(client: Client, bus: Bus) -> None:
     assert client.statuses() is not None
-    with pytest.raises(InvalidMission, match="sed=1"):
+    with pytest.raises(InvalidRequest, match="sed=1"):
         bus.query(f"{PLAN_KEY}?sed=1", mission_file(), timeout_s=WAIT_S)
 
 
@@ -281,12 +281,12 @@ def test_history_by_key(client: Client, bus: Bus) -> None:
     assert ask("kept/plan/*") == [(f"kept/plan/{revision}", revision) for revision in (1, 2, 3)]
     assert ask("kept/replan/*") == [(f"kept/replan/{revision}", revision) for revision in (2, 3)]
     assert ("kept/plan", 3) in ask("*/plan")
-    with pytest.raises(InvalidMission, match="kept/plan/4: is not kept here"):
+    with pytest.raises(InvalidRequest, match="kept/plan/4: is not kept here"):
         ask("kept/plan/4")
 
 
 def test_an_unknown_mission_has_no_status(client: Client) -> None:
-    with pytest.raises(InvalidMission, match="unheard-of"):
+    with pytest.raises(InvalidRequest, match="unheard-of"):
         client.status("unheard-of")
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from oxbow.contracts import MissionState
-from oxbow.errors import Infeasible, Internal, InvalidMission, OxbowError, Unavailable
+from oxbow.errors import Infeasible, Internal, InvalidMission, InvalidRequest, OxbowError, Unavailable
 from oxbow_mission.database import Database
 from oxbow_mission.store import SCHEMA, QueuedMission, Request, Revision, Store
 
@@ -149,7 +149,7 @@ def test_a_row_that_cannot_be_read_hides_no_other(store: Store, caplog: pytest.L
 @pytest.mark.parametrize("mission_id", ["a" * 65_530, "@lake", "a/b", "*"])
 def test_an_id_that_can_be_no_key_is_set_aside(tmp_path: Path, mission_id: str) -> None:
     with opened(tmp_path) as store:
-        with pytest.raises(InvalidMission):
+        with pytest.raises(InvalidRequest):
             store.accept(mission_id, request("a"))
         store.accept("old", request("a"))
         with store.database.transaction() as db:

@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from oxbow.contracts import layer_key
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.wire.codec import encode
 from oxbow.wire.recording import Layer, Stamped
 from oxbow_recorder.address import MOST_LAYER_BYTES, RecordedRun, address_of
@@ -37,7 +37,7 @@ def test_the_last_layer_of_a_run_is_known(name):
 @pytest.mark.parametrize("text", ["../evil", "a/b", "/tmp/evil", "..\\x", "a b", "m*", "m\n", "m\0"])
 @pytest.mark.parametrize("field", ["mission", "run", "stage", "name"])
 def test_an_id_that_is_none_is_refused(field, text):
-    with pytest.raises(InvalidMission, match="expected"):
+    with pytest.raises(InvalidRequest, match="expected"):
         address_of(layer_key("m", "path", "path"), layer_bytes(**{field: text}))
 
 
@@ -45,7 +45,7 @@ def test_an_id_that_is_none_is_refused(field, text):
     "key", [layer_key("other", "path", "path"), layer_key("m", "other", "path"), layer_key("m", "path", "other")]
 )
 def test_key_and_message_have_to_agree(key):
-    with pytest.raises(InvalidMission, match="another key"):
+    with pytest.raises(InvalidRequest, match="another key"):
         address_of(key, layer_bytes())
 
 
@@ -63,7 +63,7 @@ def test_key_and_message_have_to_agree(key):
     ids=["empty", "no type", "nested", "number", "UTF-8", "cut", "enormous"],
 )
 def test_what_is_no_layer_is_refused(payload):
-    with pytest.raises(InvalidMission):
+    with pytest.raises(InvalidRequest):
         address_of(layer_key("m", "path", "path"), payload)
 
 

@@ -64,7 +64,7 @@ def request(
         places=(launch, recovery or launch),
         shore_tolerance_m=scale_m,
     )
-    with renamed({"places[0]": "LaunchPoint", "places[1]": "RecoveryPoint"}):
+    with renamed({"places[0]": "launch", "places[1]": "recovery"}):
         space = contour(asked, discard)
     cells = decompose(DecomposeRequest(free=space.free, spacing_m=spacing_m, heading_rad=heading_rad), discard)
     return PathRequest(
@@ -87,7 +87,7 @@ def nasty_request(name: str, spacings: float, **more: Any) -> PathRequest | None
     """
     water = nasty_polygons()[name]
     refusal = (
-        "Safety: " if "sliver" in name else "LaunchPoint: lies by .* narrower than" if name == "strait" else None
+        "safety_m: " if "sliver" in name else "launch: lies by .* narrower than" if name == "strait" else None
     )
     try:
         asked = request(water, spacings=spacings, **more)

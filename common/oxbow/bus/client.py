@@ -14,7 +14,7 @@ from oxbow.bus.replicas import Replicas
 from oxbow.bus.session import Session, error_of, error_of_reply, is_timeout
 from oxbow.contracts import ANY_LIVE, MAX_REQUEST_BYTES, Endpoint, Message, live_service
 from oxbow.contracts.ids import MOST_ID_CHARACTERS
-from oxbow.errors import Busy, DeadlineExceeded, ErrorCode, Internal, InvalidMission, OxbowError, Unavailable
+from oxbow.errors import Busy, DeadlineExceeded, ErrorCode, Internal, InvalidRequest, OxbowError, Unavailable
 from oxbow.wire import codec
 from oxbow.wire.envelope import Envelope
 from oxbow.wire.waits import checked_wait
@@ -74,7 +74,7 @@ class Bus(Session):
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             `timeout_s` is no wait (`oxbow.wire.waits`).
         Unavailable
             Some have none after `timeout_s`; the message names them.
@@ -104,7 +104,7 @@ class Bus(Session):
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             The request is larger than `MAX_REQUEST_BYTES`.
         Unavailable
             The stage had no live replica for `patience_s`.
@@ -143,7 +143,7 @@ class Bus(Session):
     ) -> A:
         # Refused before it is sent: the replica would only refuse it after megabytes have crossed the network.
         if len(payload) > MAX_REQUEST_BYTES:
-            raise InvalidMission(f"is {len(payload)} bytes; at most {MAX_REQUEST_BYTES}", where=endpoint.stage)
+            raise InvalidRequest(f"is {len(payload)} bytes; at most {MAX_REQUEST_BYTES}", where=endpoint.stage)
         return _Attempts(self, endpoint, payload, envelope, read).run()
 
 
@@ -270,7 +270,7 @@ class _Attempts(Generic[A]):
             raise _Failed(f"{key} replied {whose}, not to {self.envelope.request_id!r}", WRONG)
         try:
             return self.read(sample.payload.to_bytes())
-        except InvalidMission as error:
+        except InvalidRequest as error:
             raise _Failed(f"{key} sent an invalid reply: {error}", WRONG) from error
 
     def _error(self, reply: zenoh.ReplyError, key: str, timeout_s: float) -> OxbowError:

@@ -8,7 +8,7 @@ from typing import Any
 
 import zenoh
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidOption
 
 __all__ = ["DEFAULT_ENDPOINT", "client_config", "require_endpoint", "router_config"]
 
@@ -43,7 +43,7 @@ def client_config(endpoint: str, timeout_s: float) -> zenoh.Config:
 
     Raises
     ------
-    InvalidMission
+    InvalidOption
         The endpoint is not of the form PROTOCOL/ADDRESS.
     """
     require_endpoint(endpoint)
@@ -75,13 +75,11 @@ def require_endpoint(endpoint: str, where: str = "endpoint") -> None:
 
     Raises
     ------
-    InvalidMission
+    InvalidOption
         It has not.
     """
     if not _ENDPOINT.fullmatch(endpoint):
-        raise InvalidMission(
-            f"is {endpoint!r}; expected PROTOCOL/ADDRESS, such as {DEFAULT_ENDPOINT}", where=where
-        )
+        raise InvalidOption(f"is {endpoint!r}; expected PROTOCOL/ADDRESS, such as {DEFAULT_ENDPOINT}", where=where)
 
 
 def _config(settings: dict[str, Any]) -> zenoh.Config:

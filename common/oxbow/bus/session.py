@@ -27,7 +27,7 @@ from oxbow.errors import (
     ErrorCode,
     ErrorReply,
     Internal,
-    InvalidMission,
+    InvalidRequest,
     OxbowError,
     Unavailable,
     error_text,
@@ -92,7 +92,7 @@ class Session(Closing):
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             The endpoint is not valid, or `timeout_s` is no wait (`oxbow.wire.waits`).
         Unavailable
             Nothing answered at `endpoint` within `timeout_s`.
@@ -172,7 +172,7 @@ class Session(Closing):
         ------
         Unavailable
             The session is closed.
-        InvalidMission
+        InvalidRequest
             The key is not valid.
         """
         priority = zenoh.Priority.INTERACTIVE_HIGH if urgent else zenoh.Priority.DATA
@@ -332,7 +332,7 @@ class Session(Closing):
         ------
         OxbowError
             The error that was replied; `DeadlineExceeded` after `timeout_s`; `Unavailable` where nobody answered;
-            `InvalidMission` where the selector is not valid, or `timeout_s` is no wait (`oxbow.wire.waits`).
+            `InvalidRequest` where the selector is not valid, or `timeout_s` is no wait (`oxbow.wire.waits`).
         """
         found: list[tuple[str, bytes]] = []
         failure: OxbowError | None = None
@@ -435,13 +435,13 @@ def require_key(key: str) -> None:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         It is longer than `MOST_KEY_BYTES`, or is not Unicode.
     """
     # A lone surrogate cannot be encoded: let through to be counted, and refused below with a message.
     size = len(key.encode(errors="surrogatepass"))
     if size > MOST_KEY_BYTES or any("\ud800" <= character <= "\udfff" for character in key):
-        raise InvalidMission(
+        raise InvalidRequest(
             f"is {excerpt(key)}, {size} bytes; expected at most {MOST_KEY_BYTES} bytes of Unicode", where="key"
         )
 
@@ -490,7 +490,7 @@ def error_of_reply(reply: zenoh.ReplyError, selector: str) -> StageError:
     """
     try:
         return decode_json(reply.payload.to_bytes(), StageError, "error")
-    except InvalidMission as error:
+    except InvalidRequest as error:
         return StageError(
             code=ErrorCode.INTERNAL, message=f"replied an error that cannot be read: {error}", where=selector
         )

@@ -33,7 +33,7 @@ from oxbow.contracts import (
     mission_key,
 )
 from oxbow.contracts.ids import excerpt
-from oxbow.errors import Busy, Internal, InvalidMission, Unavailable
+from oxbow.errors import Busy, Internal, InvalidInput, Unavailable
 from oxbow.mission.file import Mission, parse_mission, read_mission
 from oxbow.planning.submission import Submission, SubmissionParameters
 from oxbow.runtime.closing import Closing
@@ -191,13 +191,13 @@ class Client(Closing):
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             There is no such mission.
         """
         return _own_status(self._ask_kept(mission_key(mission_id, "cancel")), mission_id)
 
     def status(self, mission_id: str) -> MissionStatus:
-        """Where the latest revision of a mission stands; `InvalidMission` where there is no such mission."""
+        """Where the latest revision of a mission stands; `InvalidRequest` where there is no such mission."""
         return _own_status(self._ask_kept(mission_key(mission_id, "status")), mission_id)
 
     def statuses(self) -> list[MissionStatus]:
@@ -205,7 +205,7 @@ class Client(Closing):
         try:
             replies = self._ask_kept(str(MissionKey(ANY, "status")))
         # The service refuses a query that matches no mission; without any mission, that is no fault.
-        except InvalidMission:
+        except InvalidInput:
             return []
         return list(_readable_statuses(replies))
 
@@ -301,7 +301,7 @@ def _readable_statuses(
     for key, payload in samples:
         try:
             yield read_status(payload, mission_id)
-        except InvalidMission as error:
+        except InvalidInput as error:
             _log.warning("%s: ignored: %s", excerpt(key), error)
 
 
@@ -309,7 +309,7 @@ def _own_status(replies: list[tuple[str, bytes]], mission_id: str) -> MissionSta
     """The status of the mission that was asked for, and of no other."""
     try:
         return read_status(replies[0][1], mission_id)
-    except InvalidMission as error:
+    except InvalidInput as error:
         raise Internal(
             f"the mission service answered about another mission: {error}", where=f"mission {mission_id}"
         ) from error
@@ -320,7 +320,7 @@ def _own_plan(payload: bytes, submission: Submission) -> Mission:
     where = f"mission {submission.mission_id}"
     try:
         update = kept_plan(payload)
-    except InvalidMission as error:
+    except InvalidInput as error:
         raise Internal(f"the mission service's answer is not a plan: {error}", where=where) from error
     if update.mission_id != submission.mission_id or update.revision < 1:
         other = f"{excerpt(update.mission_id)}, revision {update.revision}"

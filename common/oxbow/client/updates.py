@@ -19,7 +19,7 @@ import msgspec
 from oxbow.bus.client import Bus
 from oxbow.contracts import ANY, MissionKey, MissionStatus
 from oxbow.contracts.ids import excerpt
-from oxbow.errors import InvalidMission, OxbowError, Unavailable
+from oxbow.errors import InvalidInput, InvalidRequest, OxbowError, Unavailable
 from oxbow.mission.file import Mission, parse_mission
 from oxbow.runtime.closing import Closing
 from oxbow.wire.waits import checked_wait
@@ -49,12 +49,12 @@ def kept_plan(payload: bytes) -> PlanUpdate:
 
     Raises
     ------
-    InvalidMission
+    InvalidInput
         It is no Mission File, or has no plan with the id and the revision that it is kept under.
     """
     mission = parse_mission(payload)
     if mission.plan is None or mission.plan.mission_id is None or mission.plan.revision is None:
-        raise InvalidMission(
+        raise InvalidRequest(
             "has no mission_id and revision; expected what the mission service plans", where="Plan"
         )
     return PlanUpdate(mission.plan.mission_id, mission.plan.revision, mission)
@@ -77,15 +77,15 @@ def read_status(payload: bytes, mission_id: str | None = None) -> MissionStatus:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         It is no status, or is about another mission.
     """
     try:
         status = msgspec.json.decode(payload, type=MissionStatus)
     except (msgspec.MsgspecError, ValueError) as error:
-        raise InvalidMission(f"is not a MissionStatus: {error}", where="status") from error
+        raise InvalidRequest(f"is not a MissionStatus: {error}", where="status") from error
     if mission_id is not None and status.mission_id != mission_id:
-        raise InvalidMission(f"is of {excerpt(status.mission_id)}; expected {mission_id!r}", where="status")
+        raise InvalidRequest(f"is of {excerpt(status.mission_id)}; expected {mission_id!r}", where="status")
     return status
 
 
@@ -93,12 +93,12 @@ def _keyed_plan(key: str, payload: bytes) -> PlanUpdate:
     """The plan under a key, if it is the one that the key names."""
     named, update = MissionKey.parse(key), kept_plan(payload)
     if update.mission_id != named.mission_id:
-        raise InvalidMission(
+        raise InvalidRequest(
             f"is {excerpt(update.mission_id)}; expected that of its key, {excerpt(named.mission_id)}",
             where="Plan.mission_id",
         )
     if named.revision not in (None, update.revision):
-        raise InvalidMission(
+        raise InvalidRequest(
             f"is {update.revision}; expected that of its key, {named.revision}", where="Plan.revision"
         )
     return update
@@ -186,7 +186,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
         key, payload = sample
         try:
             heard = _keyed_plan(key, payload)
-        except InvalidMission as error:
+        except InvalidInput as error:
             _log.warning("%s: ignored: %s", excerpt(key), error)
             return
         if heard.revision <= self._seen.get(heard.mission_id, 0):
@@ -246,7 +246,7 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
         for own_key, payload in self._ask(f"{key}?after={seen}"):
             try:
                 update = _keyed_plan(own_key, payload)
-            except InvalidMission as error:
+            except InvalidInput as error:
                 _log.warning("%s: ignored: %s", excerpt(own_key), error)
             else:
                 found[update.revision] = update
@@ -261,13 +261,13 @@ class PlanUpdates(Closing, Iterator[PlanUpdate]):
         for own_key, payload in self._ask(str(MissionKey(self._key.mission_id, "status"))):
             try:
                 yield read_status(payload, asked)
-            except InvalidMission as error:
+            except InvalidInput as error:
                 _log.warning("%s: ignored: %s", excerpt(own_key), error)
 
     def _ask(self, key: str) -> list[tuple[str, bytes]]:
         try:
             return self._bus.query(key, timeout_s=ANSWER_S)
-        except InvalidMission:  # nothing of the kind is kept
+        except InvalidInput:  # nothing of the kind is kept
             return []
 
 

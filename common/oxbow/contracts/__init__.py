@@ -5,6 +5,7 @@ A message that exists is valid: `__post_init__` enforces its invariants on both 
 Each stage has a module in this package. Key expressions are in `keys` and nowhere else.
 """
 
+from oxbow.contracts.approach import Approach, MiddleLine
 from oxbow.contracts.assignment import Assignment, AssignRequest, HotSpot, LeftSpot, Role, Share, Sortie, Vehicle
 from oxbow.contracts.certificate import (
     Certificate,
@@ -88,6 +89,7 @@ __all__ = [
     "PLAN_KEY",
     "PREFIX",
     "STAGES",
+    "Approach",
     "AssignRequest",
     "Assignment",
     "Call",
@@ -113,6 +115,7 @@ __all__ = [
     "Measures",
     "Message",
     "Method",
+    "MiddleLine",
     "MissionKey",
     "MissionState",
     "MissionStatus",

@@ -9,6 +9,7 @@ from msgspec import field
 from shapely import LineString, Polygon
 
 from oxbow.arrays import Place
+from oxbow.contracts.approach import Approach
 from oxbow.contracts.contour import DroppedPart
 from oxbow.contracts.danger import DANGER_DETOUR_M, DangerZone
 from oxbow.contracts.ids import MOST_ID_CHARACTERS, excerpt
@@ -22,7 +23,7 @@ from oxbow.contracts.message import (
     require_place,
 )
 from oxbow.contracts.route import RouteMethod
-from oxbow.errors import InvalidMission, renamed
+from oxbow.errors import InvalidRequest, renamed
 from oxbow.tolerances import FARTHEST_M
 
 __all__ = ["AssignRequest", "Assignment", "HotSpot", "LeftSpot", "Role", "Share", "Sortie", "Vehicle"]
@@ -58,7 +59,7 @@ class Vehicle(Message, frozen=True, kw_only=True):
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         A vehicle without a name, a speed, a range or a place, or a factor below 1; the error names the vehicle.
     """
 
@@ -73,22 +74,26 @@ class Vehicle(Message, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         if not self.name:
-            raise InvalidMission("is empty; expected a name for every vehicle", where="name")
+            raise InvalidRequest("is empty; expected a name for every vehicle", where="name")
         # Before the name is quoted below in the errors of other fields.
         if len(self.name) > MOST_ID_CHARACTERS:
-            raise InvalidMission(
+            raise InvalidRequest(
                 f"is {excerpt(self.name)}; expected at most {MOST_ID_CHARACTERS} characters", where="name"
             )
-        with renamed({name: f"vehicle {self.name!r}: {name}" for name in self.__struct_fields__}):
+        with renamed({name: self.field(name) for name in self.__struct_fields__}):
             require_finite(self, "speed_mps", "length_m", above=0.0, most=MOST_LENGTH_M)
             require_finite(self, "danger_factor", least=1.0)
             require_place(self, "start", "recovery")
         for spot, factor in self.danger_factors.items():
             if not 1.0 <= factor < math.inf:
-                raise InvalidMission(
+                raise InvalidRequest(
                     f"is {factor!r}; expected a finite number >= 1",
-                    where=f"vehicle {self.name!r}: danger_factors[{excerpt(spot)}]",
+                    where=self.field(f"danger_factors[{excerpt(spot)}]"),
                 )
+
+    def field(self, name: str) -> str:
+        """What errors call one of its fields, where a request has several vehicles."""
+        return f"vehicle {self.name!r}: {name}"
 
 
 class HotSpot(Message, frozen=True, kw_only=True):
@@ -116,6 +121,9 @@ class AssignRequest(Message, frozen=True, kw_only=True):
         The fleet.
     share_free
         Whether the free space is to be shared among the masters, in proportion to the range that their ways leave.
+    spacing_m
+        The nominal spacing of the surveys, in proportion to which legs to shares keep apart; by default, what the
+        masters' ranges allow.
     footprint_m
         The longest edge of the triangles that shares are made of; by default, the stage chooses it.
     hot_spots
@@ -136,6 +144,7 @@ class AssignRequest(Message, frozen=True, kw_only=True):
     water: Polygon | None = None
     vehicles: tuple[Vehicle, ...]
     share_free: bool = False
+    spacing_m: float | None = None
     footprint_m: float | None = None
     hot_spots: tuple[HotSpot, ...] = ()
     swath_m: float | None = None
@@ -146,24 +155,25 @@ class AssignRequest(Message, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         require_area(self, "free", "water")
-        require_finite(self, "footprint_m", "swath_m", above=0.0, most=FARTHEST_M)
+        require_finite(self, "spacing_m", "footprint_m", "swath_m", above=0.0, most=FARTHEST_M)
         require_finite(self, "danger_detour_m", least=0.0, most=MOST_LENGTH_M)
         require_finite(self, "seed", least=0, most=MOST_SEED)
         if not self.vehicles:
-            raise InvalidMission("is empty; expected one vehicle or more", where="vehicles")
+            raise InvalidRequest("is empty; expected one vehicle or more", where="vehicles")
         names = [vehicle.name for vehicle in self.vehicles]
         if len(set(names)) < len(names):
             twice = next(name for name in names if names.count(name) > 1)
-            raise InvalidMission(f"has {twice!r} twice; expected a different name for each", where="vehicles")
+            raise InvalidRequest(f"has {twice!r} twice; expected a different name for each", where="vehicles")
         if self.hot_spots and self.swath_m is None:
-            raise InvalidMission("is missing; hot spots are treated in passes of that width", where="swath_m")
+            raise InvalidRequest("is missing; hot spots are treated in passes of that width", where="swath_m")
 
 
 class Share(Message, frozen=True, kw_only=True):
-    """The connected part of the free space that one master surveys."""
+    """The connected part of the free space that one master surveys, and how it gets there and home."""
 
     vehicle: str
     area: Polygon
+    approach: Approach
 
     def __post_init__(self) -> None:
         require_area(self, "area")
@@ -237,4 +247,4 @@ class Assignment(Message, frozen=True, kw_only=True):
         require_finite(self, "imbalance", "makespan_s", least=0.0)
         require_finite(self, "joint_gap")
         if not all(0.0 <= share < math.inf for share in self.treated_share):
-            raise InvalidMission(f"is {self.treated_share!r}; expected numbers from 0", where="treated_share")
+            raise InvalidRequest(f"is {self.treated_share!r}; expected numbers from 0", where="treated_share")

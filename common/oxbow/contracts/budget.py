@@ -51,7 +51,7 @@ def too_short(
     *,
     what: str = "the shortest path from launch to recovery",
     reserve: float = LENGTH_RESERVE,
-    where: str = "Master_length",
+    where: str = "length_m",
 ) -> Infeasible:
     """The refusal of a length that does not suffice, with the length that is necessary.
 

@@ -10,7 +10,7 @@ from shapely import LineString, Polygon
 from oxbow.arrays import Place
 from oxbow.contracts.danger import DangerZone
 from oxbow.contracts.message import Message, require_area, require_finite, require_line, require_place
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.tolerances import FARTHEST_M
 
 __all__ = [
@@ -53,7 +53,7 @@ class Variogram(Message, frozen=True, kw_only=True, forbid_unknown_fields=True):
         require_finite(self, "range_m", "sill", above=0.0)
         require_finite(self, "nugget", least=0.0)
         if self.nugget >= self.sill:
-            raise InvalidMission(f"is {self.nugget!r}; expected less than the sill, {self.sill!r}", where="nugget")
+            raise InvalidRequest(f"is {self.nugget!r}; expected less than the sill, {self.sill!r}", where="nugget")
 
 
 class Track(Message, frozen=True, kw_only=True):
@@ -69,7 +69,7 @@ class Track(Message, frozen=True, kw_only=True):
         require_place(self, "launch", "recovery")
         require_line(self, "path")
         if not (0 < self.path.length < math.inf):
-            raise InvalidMission(
+            raise InvalidRequest(
                 f"is {self.path.length!r} m long; expected a path of finite length > 0", where="path"
             )
 
@@ -129,7 +129,7 @@ class Fault(Message, frozen=True, kw_only=True):
 
 
 class Leg(Message, frozen=True, kw_only=True):
-    """The stretch of a path next to its launch or recovery point that runs nearer to the shore than Safety.
+    """The stretch of a path beside its launch or recovery point that runs within the safety distance.
 
     `unsafe_m` metres of it do, `ashore_m` of these over land. The position of the point makes
     `least_ashore_m` and about `most_unsafe_m` necessary: the one is its distance from the water, the other the
@@ -203,7 +203,7 @@ class Measures(Conformance, frozen=True, kw_only=True):
         super().__post_init__()
         low_m, high_m = self.cover_radius_m
         if not 0.0 <= low_m <= high_m < math.inf:
-            raise InvalidMission(f"is {self.cover_radius_m!r}; expected 0 <= low <= high", where="cover_radius_m")
+            raise InvalidRequest(f"is {self.cover_radius_m!r}; expected 0 <= low <= high", where="cover_radius_m")
 
 
 class Certificate(Measures, frozen=True, kw_only=True):

@@ -8,7 +8,7 @@ import math
 from shapely import Polygon
 
 from oxbow.contracts.message import Message, require_area
-from oxbow.errors import InvalidMission, renamed
+from oxbow.errors import InvalidRequest, renamed
 
 __all__ = ["DANGER_DETOUR_M", "DangerZone", "Per"]
 
@@ -40,7 +40,7 @@ class DangerZone(Message, frozen=True, kw_only=True):
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         The probability is out of range, or the area is empty or not valid; names the zone.
     """
 
@@ -51,7 +51,7 @@ class DangerZone(Message, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.probability < 1.0:
-            raise InvalidMission(
+            raise InvalidRequest(
                 f"has danger {self.probability!r}; expected 0 <= danger < 1 (what must not be entered is a"
                 " forbidden zone)",
                 where=self.name,

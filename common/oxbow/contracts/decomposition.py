@@ -10,7 +10,7 @@ from shapely import Polygon
 
 from oxbow.arrays import FloatArray, Place
 from oxbow.contracts.message import MOST_LENGTH_M, Message, require_area, require_finite, require_place
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.tolerances import FARTHEST_M, ROUNDING_M
 
 __all__ = ["Cell", "CriticalKind", "CriticalPoint", "DecomposeRequest", "Decomposition", "HeadingScore"]
@@ -52,14 +52,14 @@ class Cell(Message, frozen=True, kw_only=True):
         for field in ("floor", "ceiling"):
             chain = getattr(self, field)
             if chain.ndim != 2 or chain.shape[1] != 2 or len(chain) < 1 or (np.diff(chain[:, 0]) < 0).any():
-                raise InvalidMission("is not an (n, 2) chain with non-decreasing u", where=field)
+                raise InvalidRequest("is not an (n, 2) chain with non-decreasing u", where=field)
             # As `<=`, since NaN compares false and would pass a test for `>`.
             if not (np.abs(chain) <= FARTHEST_M).all():
                 message = f"has coordinates that are not finite, or beyond {FARTHEST_M:g} m"
-                raise InvalidMission(message, where=field)
+                raise InvalidRequest(message, where=field)
         # Exactly: both chains come from one sweep, which takes their ends from the same critical points.
         if (self.floor[[0, -1], 0] != self.ceiling[[0, -1], 0]).any():
-            raise InvalidMission("begins or ends at another u than the floor", where="ceiling")
+            raise InvalidRequest("begins or ends at another u than the floor", where="ceiling")
 
 
 class HeadingScore(Message, frozen=True, kw_only=True):
@@ -103,7 +103,7 @@ class Decomposition(Message, frozen=True, kw_only=True):
         most = len(self.critical_points)
         for number, cell in enumerate(self.cells):
             if not (0 <= cell.start < most and 0 <= cell.end < most):
-                raise InvalidMission(
+                raise InvalidRequest(
                     f"joins the critical points {cell.start} and {cell.end}; there are {most}",
                     where=f"cells[{number}]",
                 )
@@ -120,6 +120,6 @@ class Decomposition(Message, frozen=True, kw_only=True):
         off_m = np.abs(points - ends).max(axis=1)
         if off_m.max() > ROUNDING_M:
             worst = int(off_m.argmax())
-            raise InvalidMission(
+            raise InvalidRequest(
                 f"begins or ends {off_m[worst]:g} m from its critical points", where=f"cells[{worst}]"
             )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 
 __all__ = ["MOST_ID_CHARACTERS", "checked_id", "excerpt"]
 
@@ -32,7 +32,7 @@ def checked_id(text: str, where: str = "id") -> str:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         It is empty, too long, begins with ``.`` or ``@``, or has a character that is not accepted.
     """
     # The length first: no pattern is matched against megabytes from outside.
@@ -41,7 +41,7 @@ def checked_id(text: str, where: str = "id") -> str:
     accepted = f"expected 1 to {MOST_ID_CHARACTERS} of A-Z a-z 0-9 _ . -"
     if text.startswith((".", "@")):
         accepted = f"{accepted}, none that begins with {text[0]!r}"
-    raise InvalidMission(f"is {excerpt(text)}; {accepted}", where=where)
+    raise InvalidRequest(f"is {excerpt(text)}; {accepted}", where=where)
 
 
 def excerpt(text: str) -> str:

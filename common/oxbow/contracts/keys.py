@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 
 from oxbow.contracts.ids import checked_id, excerpt
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 
 __all__ = [
     "ANY",
@@ -48,7 +48,7 @@ def live_key(service: str, instance: str) -> str:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         One of them is not accepted (`checked_id`).
     """
     return f"{PREFIX}/live/{checked_id(service)}/{checked_id(instance)}"
@@ -79,7 +79,7 @@ def introspection_key(service: str, instance: str, what: str) -> str:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         `service` or `instance` is not accepted (`checked_id`).
     """
     return f"{PREFIX}/stage/{checked_id(service)}/{checked_id(instance)}/@{what}"
@@ -124,13 +124,13 @@ class MissionKey:
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             It is not the key of a mission.
         """
         match = _MISSION_KEY.fullmatch(key)
         if match is None:
             expected = f"{PREFIX}/mission/{{id}}/{{what}}[/{{revision}}], each one name, number or {ANY}"
-            raise InvalidMission(f"is {excerpt(key)}; expected {expected}", where="key")
+            raise InvalidRequest(f"is {excerpt(key)}; expected {expected}", where="key")
         mission_id, what, revision = match.groups()
         return cls(mission_id, what, int(revision) if revision and revision != ANY else revision)
 
@@ -156,7 +156,7 @@ def mission_key(mission_id: str, what: str) -> str:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         The id is not accepted (`checked_id`).
     """
     return str(MissionKey(checked_id(mission_id), what))
@@ -184,7 +184,7 @@ def layer_key(mission_id: str, stage: str, name: str) -> str:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         One of them is not accepted (`checked_id`).
     """
     return f"{PREFIX}/layer/{checked_id(mission_id)}/{checked_id(stage)}/{checked_id(name)}"

@@ -13,7 +13,7 @@ from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import Place
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.tolerances import FARTHEST_M
 
 __all__ = [
@@ -42,7 +42,7 @@ MOST_SHOWN_BITS = 64
 class Message(msgspec.Struct, frozen=True, kw_only=True):
     """Base of every message on the bus between Oxbow's own processes.
 
-    A message checks its invariants when it is made, and raises `InvalidMission` with the name of the field.
+    A message checks its invariants when it is made, and raises `InvalidRequest` with the name of the field.
     """
 
 
@@ -68,7 +68,7 @@ def require_finite(
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         A field is not finite or out of bounds; names the field.
     """
     for field in fields:
@@ -77,7 +77,7 @@ def require_finite(
         if value is not None and not (least <= value <= most and value > above):
             accepted = f"> {above}" if above > -math.inf else f">= {least}" if least > -math.inf else "any"
             bound = "" if most == sys.float_info.max else f", at most {most:g}"
-            raise InvalidMission(f"is {_shown(value)}; expected a finite number, {accepted}{bound}", where=field)
+            raise InvalidRequest(f"is {_shown(value)}; expected a finite number, {accepted}{bound}", where=field)
 
 
 def _shown(value: float) -> str:
@@ -99,14 +99,14 @@ def require_area(message: Message, *fields: str) -> None:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         A polygon is not of that kind, or a coordinate is not finite or beyond `FARTHEST_M`; names the field.
     """
     for where, polygon in _geometries(message, fields):
         _require_kind(polygon, Polygon, where)
         # The ufunc, not the property: it releases the interpreter's lock while it works.
         if polygon.is_empty or not shapely.is_valid(polygon):
-            raise InvalidMission("is empty or not a valid polygon", where=where)
+            raise InvalidRequest("is empty or not a valid polygon", where=where)
 
 
 def require_line(message: Message, *fields: str) -> None:
@@ -121,13 +121,13 @@ def require_line(message: Message, *fields: str) -> None:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         A line is empty, or a coordinate is not finite or beyond `FARTHEST_M`; names the field.
     """
     for where, line in _geometries(message, fields):
         _require_kind(line, LineString, where)
         if line.is_empty:
-            raise InvalidMission("is empty; expected a line", where=where)
+            raise InvalidRequest("is empty; expected a line", where=where)
 
 
 def require_place(message: Message, *fields: str) -> None:
@@ -142,7 +142,7 @@ def require_place(message: Message, *fields: str) -> None:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         A coordinate is not finite or beyond `FARTHEST_M`; names the field.
     """
     for field in fields:
@@ -162,7 +162,7 @@ def require_places(message: Message, *fields: str) -> None:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         A coordinate is not finite or beyond `FARTHEST_M`; names the field and the place.
     """
     for field in fields:
@@ -173,7 +173,7 @@ def require_places(message: Message, *fields: str) -> None:
 def _require_in_plane(place: Place, where: str) -> None:
     # Not `any(... > FARTHEST_M)`, which NaN would pass.
     if not all(abs(coordinate) <= FARTHEST_M for coordinate in place):
-        raise InvalidMission(
+        raise InvalidRequest(
             f"is {tuple(place)!r}; expected two finite numbers within {FARTHEST_M:g} m", where=where
         )
 
@@ -190,6 +190,6 @@ def _geometries(message: Message, fields: Iterable[str]) -> Iterator[tuple[str, 
 
 def _require_kind(geometry: BaseGeometry, kind: type[BaseGeometry], where: str) -> None:
     if not isinstance(geometry, kind):
-        raise InvalidMission(f"is a {type(geometry).__name__}; expected a {kind.__name__}", where=where)
+        raise InvalidRequest(f"is a {type(geometry).__name__}; expected a {kind.__name__}", where=where)
     if not (np.abs(shapely.get_coordinates(geometry)) <= FARTHEST_M).all():
-        raise InvalidMission(f"has coordinates that are not finite, or beyond {FARTHEST_M:g} m", where=where)
+        raise InvalidRequest(f"has coordinates that are not finite, or beyond {FARTHEST_M:g} m", where=where)

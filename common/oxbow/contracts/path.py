@@ -8,6 +8,7 @@ import math
 from shapely import LineString, Polygon
 
 from oxbow.arrays import Place
+from oxbow.contracts.approach import Approach
 from oxbow.contracts.contour import DroppedPart, FreeSpace
 from oxbow.contracts.decomposition import Decomposition
 from oxbow.contracts.message import (
@@ -20,7 +21,7 @@ from oxbow.contracts.message import (
     require_place,
 )
 from oxbow.contracts.missions import MOST_DEADLINE_S
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 
 __all__ = ["Draw", "Method", "PathPlan", "PathRequest", "SpacingStep", "WeightedArea"]
 
@@ -61,8 +62,8 @@ class PathRequest(Message, frozen=True, kw_only=True):
 
     `weighted_areas` do not overlap, and may reach beyond the water. `time_limit_s` is what may be spent on
     improving the path; without it the work is fixed, and the same request gives the same path everywhere.
-    `smooth` asks for rounded corners. Only the space-filling curve uses `draw`. `spent_m` is what the vehicle
-    needs on its way to this path and home from it, in addition to `length_m`: errors report the sum of both.
+    `smooth` asks for rounded corners. Only the space-filling curve uses `draw`. Where there is an `approach`, the
+    free space is a share, and the path has legs to it and home through the water around.
     """
 
     method: Method = Method.SPACE_FILLING_CURVE
@@ -71,7 +72,7 @@ class PathRequest(Message, frozen=True, kw_only=True):
     launch: Place
     recovery: Place
     length_m: float
-    spent_m: float = 0.0
+    approach: Approach | None = None
     min_spacing_m: float = 0.0
     seed: int = 0
     weighted_areas: tuple[WeightedArea, ...] = ()
@@ -82,16 +83,21 @@ class PathRequest(Message, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         require_finite(self, "length_m", above=0.0, most=MOST_LENGTH_M)
         require_finite(self, "time_limit_s", above=0.0, most=MOST_DEADLINE_S)
-        require_finite(self, "spent_m", "min_spacing_m", least=0.0, most=MOST_LENGTH_M)
+        require_finite(self, "min_spacing_m", least=0.0, most=MOST_LENGTH_M)
         x0, y0, x1, y1 = self.space.free.bounds
         extent_m = math.hypot(x1 - x0, y1 - y0)
         if self.min_spacing_m > extent_m:
-            raise InvalidMission(
+            raise InvalidRequest(
                 f"is {self.min_spacing_m:g} m; expected at most the extent of the water, {extent_m:.0f} m",
                 where="min_spacing_m",
             )
         require_finite(self, "seed", least=0, most=MOST_SEED)
         require_place(self, "launch", "recovery")
+        if self.approach is not None and self.approach.legs_m >= self.length_m:
+            raise InvalidRequest(
+                f"is {self.length_m:g} m; expected more than its legs take, {self.approach.legs_m:g} m",
+                where="length_m",
+            )
 
 
 class SpacingStep(Message, frozen=True, kw_only=True):

@@ -50,7 +50,7 @@ class Endpoint(Generic[Q, R]):
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             The instance is not accepted (`checked_id`).
         """
         return introspection_key(self.stage, instance, what)

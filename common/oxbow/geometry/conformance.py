@@ -28,7 +28,7 @@ from oxbow.geometry.route.gate_routes import Routes
 from oxbow.geometry.stretches import PathSegments, clipped_stretches, covered_m, gaps_between, merged_stretches
 from oxbow.tolerances import ROUNDING_M
 
-__all__ = ["Conduct", "Shore", "crossings_of", "strays"]
+__all__ = ["SHORE_TOLERANCE_M", "Conduct", "Shore", "crossings_of", "strays"]
 
 SHORE_TOLERANCE_M = 0.01
 """A path this close to the shore is on it, and shorter stretches do not count: the seventh decimal of a degree is
@@ -288,7 +288,7 @@ class _End:
         return min(self.at_m, self.open_m), max(self.at_m, self.open_m)
 
 
-def strays(path: LineString, free: Polygon, launch: Place, recovery: Place) -> list[BaseGeometry]:
+def strays(path: LineString, free: BaseGeometry, launch: Place, recovery: Place) -> list[BaseGeometry]:
     """The stretches of a path outside a free space that are not legs: they touch neither launch nor recovery.
 
     Parameters

@@ -16,7 +16,7 @@ import numpy as np
 
 from oxbow.contracts import MAX_REQUEST_BYTES, Role, Variogram
 from oxbow.contracts.message import LEAST_LENGTH_M, MOST_LENGTH_M
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidInput, InvalidMission, about_mission
 from oxbow.geometry.frame import Position, lonlat
 from oxbow.mission.danger_zones import GivenDangerZone, require_dangers
 from oxbow.mission.files import read_bytes, write_atomically
@@ -74,7 +74,7 @@ class Bloom(msgspec.Struct, frozen=True, kw_only=True, rename={"sensor": "Sensor
     extra: dict[str, Any] = {}
 
 
-_JSON_NAMES = {
+JSON_NAMES = {
     "mission_type": "MissionType",
     "site_name": "SiteName",
     "launch": "LaunchPoint",
@@ -132,7 +132,7 @@ class OutlineName(enum.StrEnum):
     IN_BOX = "InBox"
 
 
-class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
+class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=JSON_NAMES):
     """A Mission File whose values are in range; `oxbow.site.site.Site` checks its geometry.
 
     Parameters
@@ -203,7 +203,7 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
             value = getattr(self, field)
             if value is not None and not least <= value <= most:
                 raise InvalidMission(
-                    f"is {value!r}; expected a number from {least:g} to {most:g}", where=_JSON_NAMES[field]
+                    f"is {value!r}; expected a number from {least:g} to {most:g}", where=JSON_NAMES[field]
                 )
         if self.bloom is None and self.mission_type in NEEDS_BLOOM:
             raise InvalidMission(
@@ -277,7 +277,7 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, rename=_JSON_NAMES):
             _require_degrees(f"Paths[{index}].Path", planned.path)
 
 
-FIELD_NAMES = frozenset(_JSON_NAMES.values()) | {name.value for name in OutlineName}
+FIELD_NAMES = frozenset(JSON_NAMES.values()) | {name.value for name in OutlineName}
 """Every known field of the Mission File."""
 
 
@@ -299,6 +299,7 @@ def _require_degrees(name: str, positions: Sequence[Position], *, indexed: bool 
 # --------------------------------------------------------------------------- the file
 
 
+@about_mission()
 def parse_mission(data: bytes) -> Mission:
     """The mission that a Mission File holds.
 
@@ -330,7 +331,7 @@ def parse_mission(data: bytes) -> Mission:
     prior = document.pop("PriorModel", None)
     try:
         mission = decode_json(msgspec.json.encode(document), Mission, "Mission File")
-    except InvalidMission as error:
+    except InvalidInput as error:
         # Errors use the name that the author used.
         if names == [OutlineName.IN_BOX] and error.where.startswith("BoundingBox"):
             raise InvalidMission(error.message, error.where.replace("BoundingBox", "InBox", 1)) from error
@@ -340,7 +341,7 @@ def parse_mission(data: bytes) -> Mission:
 
 def mission_json(mission: Mission) -> bytes:
     """The Mission File of a mission: the input fields, the unknown ones, and last the paths and the plan."""
-    given = {json: getattr(mission, field) for field, json in _JSON_NAMES.items()}
+    given = {json: getattr(mission, field) for field, json in JSON_NAMES.items()}
     outputs = {name: given.pop(name) for name in ("Master_Path", "Slave_Path", "Paths", "Plan")}
     outline = given.pop("BoundingBox")
     if mission.prior_model is not None:

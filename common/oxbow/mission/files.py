@@ -8,7 +8,7 @@ import shutil
 import stat
 from pathlib import Path
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidOption
 
 __all__ = ["move_into_place", "read_bytes", "write_atomically"]
 
@@ -35,7 +35,7 @@ def read_bytes(path: Path, limit: int) -> bytes:
 
     Raises
     ------
-    InvalidMission
+    InvalidOption
         It cannot be read, or holds more than `limit` bytes.
     """
     try:
@@ -47,9 +47,9 @@ def read_bytes(path: Path, limit: int) -> bytes:
             os.set_blocking(descriptor, True)
             data += file.read(limit + 1 - len(data))  # one byte more shows that the file is too large
     except OSError as error:
-        raise InvalidMission(f"cannot be read: {error.strerror}", where=str(path)) from error
+        raise InvalidOption(f"cannot be read: {error.strerror}", where=str(path)) from error
     if len(data) > limit:
-        raise InvalidMission(f"is larger than {limit} bytes", where=str(path))
+        raise InvalidOption(f"is larger than {limit} bytes", where=str(path))
     return data
 
 
@@ -57,7 +57,7 @@ def _begun(descriptor: int, name: str) -> bytes:
     """What a pipe holds now; nothing of a regular file. What could be waited for without end is refused."""
     mode = os.fstat(descriptor).st_mode
     if stat.S_ISCHR(mode) or stat.S_ISBLK(mode):
-        raise InvalidMission("cannot be read: is a device; expected a file", where=name)
+        raise InvalidOption("cannot be read: is a device; expected a file", where=name)
     if not stat.S_ISFIFO(mode):
         return b""
     try:
@@ -65,7 +65,7 @@ def _begun(descriptor: int, name: str) -> bytes:
     except BlockingIOError:  # there is a writer
         return b""
     if not data:
-        raise InvalidMission("cannot be read: is a pipe that nobody writes to", where=name)
+        raise InvalidOption("cannot be read: is a pipe that nobody writes to", where=name)
     return data
 
 

@@ -20,7 +20,7 @@ from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import FloatArray
 from oxbow.contracts import Variogram
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidInput, InvalidMission
 from oxbow.geometry.crossings import MOST_PAIRS, TooManyPairs, is_valid
 from oxbow.mission.coordinates import GivenPoint, GivenPolygon, lonlat_of, require_wgs84
 from oxbow.wire.strict_json import decode_json, utf8, with_extra
@@ -212,7 +212,7 @@ def _inside(place: str) -> Iterator[None]:
     """Say of every error where in the whole document it happened."""
     try:
         yield
-    except InvalidMission as error:
+    except InvalidInput as error:
         dot = "" if error.where.startswith("[") or not error.where else "."
         raise InvalidMission(error.message, f"{place}{dot}{error.where}") from error
 

@@ -154,7 +154,7 @@ def _fleet(teams: Sequence[TeamPlan], written: Sequence[Sequence[_Written]]) -> 
         for team, own in zip(teams, written, strict=True)
         for each, conformance in zip(own, team.certificate.tracks or (team.certificate,), strict=True)
     ]
-    if len(vehicles) == 1 and not vehicles[0].hot_spots:
+    if len(vehicles) == 1 and not teams[0].treats:
         return None
     return FleetRecord(
         makespan_s=max(vehicle.duration_s for vehicle in vehicles),
@@ -165,7 +165,7 @@ def _fleet(teams: Sequence[TeamPlan], written: Sequence[Sequence[_Written]]) -> 
 
 def _team_warnings(mission: Mission, options: PlanOptions, team: TeamPlan) -> tuple[str, ...]:
     warnings = (*_unsafe_legs(mission, team), *team.warnings)
-    if not any(plan.hot_spots for plan in team.vehicles):
+    if not team.treats:
         return warnings + _near_legs(mission, team)
     if options.smooth:
         return (*warnings, "passes over hot spots keep their corners: only surveys are smoothed")
@@ -178,10 +178,11 @@ def _unsafe_legs(mission: Mission, team: TeamPlan) -> Iterator[str]:
     tracks = team.certificate.tracks or (team.certificate,)
     for plan, track in zip(team.vehicles, tracks, strict=True):
         vehicle = plan.member.vehicle
-        for field, leg in zip(("LaunchPoint", "RecoveryPoint"), track.legs, strict=False):
-            if field == "RecoveryPoint" and vehicle.recovery == vehicle.start:
-                continue
-            where = plan.member.with_name(plan.member.fields.get(field, field))
+        fields = plan.member.fields
+        # Where a vehicle comes back to its start, the leg home is that from the start.
+        ends = (fields.start,) if vehicle.recovery == vehicle.start else (fields.start, fields.recovery)
+        for field, leg in zip(ends, track.legs, strict=False):
+            where = plan.member.with_name(field)
             if leg.ashore_m > 0.0:
                 yield f"{where} lies ashore: {leg.ashore_m:.3g} m of its leg lead over land"
             if leg.unsafe_m > LONG_LEG * mission.safety_m + leg.ashore_m:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import msgspec
-from shapely import LineString, Polygon
+from shapely import Polygon
 
 from oxbow.contracts import (
     ASSIGN,
@@ -15,6 +15,7 @@ from oxbow.contracts import (
     CONTOUR,
     DECOMPOSE,
     PATH,
+    Approach,
     Assignment,
     AssignRequest,
     Call,
@@ -27,19 +28,23 @@ from oxbow.contracts import (
     PathPlan,
     PathRequest,
     Role,
+    Share,
     Track,
 )
-from oxbow.contracts.budget import WELL_USED, nominal_spacing_m
-from oxbow.errors import Infeasible, renamed
+from oxbow.contracts.budget import nominal_spacing_m
+from oxbow.errors import Infeasible
 from oxbow.geometry.conformance import Shore
 from oxbow.mission.file import Mission, PlanOptions
-from oxbow.planning.approach import Approach, Harbour
 from oxbow.planning.completion import completed_mission
+from oxbow.planning.field_names import FieldNames, NamedCall
 from oxbow.planning.verification import CheckedCall, require_faultless, require_fit_to_follow
-from oxbow.site.fleet import Member, TeamPlan, VehiclePlan
+from oxbow.site.fleet import Member, Team, TeamPlan, VehiclePlan
 from oxbow.site.site import Site
 
 __all__ = ["expected_calls", "plan_mission"]
+
+FAR = 0.25
+"""Legs that take more than this share of a range are warned about: that length is missing from the survey."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +67,9 @@ class MissionTask:
         return member.vehicle.name if len(self.site.members) > 1 else ""
 
 
-def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: Call) -> Mission:
+def plan_mission(
+    mission: Mission, options: PlanOptions | None = None, *, call: Call, site: Site | None = None
+) -> Mission:
     """Plan a mission's nominal paths and certify them (Rendas and Li 2016, section 1.1).
 
     Masters survey. Slaves treat the hot spots of the prior model; where it has none, they survey too, as far as
@@ -76,6 +83,8 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
         Method, seed and the like; the defaults of `PlanOptions` where absent.
     call
         How the stages are reached.
+    site
+        The mission's site, where the caller has it already.
 
     Returns
     -------
@@ -108,10 +117,15 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
     >>> 0.95 * 2000.0 < planned.plan.length_m <= 2000.0
     True
     """
-    # 1. The water to plan on, at the safety distance from every shore.
     options = options or PlanOptions()
-    call = CheckedCall(call)
-    site = Site.of(mission)
+    site = site or Site.of(mission)
+    names = FieldNames.of_mission(mission, site)
+    with names.in_errors():
+        return _planned(mission, options, site, NamedCall(CheckedCall(call), names))
+
+
+def _planned(mission: Mission, options: PlanOptions, site: Site, call: Call) -> Mission:
+    # 1. The water to plan on, at the safety distance from every shore.
     contour = ContourRequest(
         outline=site.outline,
         zones=site.zones,
@@ -122,21 +136,14 @@ def plan_mission(mission: Mission, options: PlanOptions | None = None, *, call: 
         shore_tolerance_m=mission.shore_tolerance_m,
         least_width_m=mission.least_width_m,
     )
-    # Stages know places by number only: their errors are given the names of the author's fields.
-    fields = {f"places[{index}]": field for index, field in enumerate(site.ends)}
-    with renamed(fields | {"least_width_m": "Least_width"}):
-        space = call(CONTOUR, contour)
+    task = MissionTask(mission, options, site, call(CONTOUR, contour), call)
     # 2. The paths of each team, one team after the other: every role has a task of its own.
-    task = MissionTask(mission, options, site, space, call)
-    teams = [
-        treatment(task) if role is Role.SLAVE and site.hot_spots else survey(task, site.team(role))
-        for role in mission.mission_type.roles
-    ]
+    teams = [treatment(task, team) if team.treats else survey(task, team) for team in site.teams]
     # 3. The record of all of it, in degrees.
     return completed_mission(mission, options, site, task.space, teams)
 
 
-def survey(task: MissionTask, team: Sequence[Member]) -> TeamPlan:
+def survey(task: MissionTask, team: Team) -> TeamPlan:
     """Cover the free space: one vehicle all of it, several a share each.
 
     Parameters
@@ -144,7 +151,7 @@ def survey(task: MissionTask, team: Sequence[Member]) -> TeamPlan:
     task
         The mission, its site and its free space.
     team
-        The vehicles that survey, at least one.
+        The vehicles that survey.
 
     Returns
     -------
@@ -152,27 +159,37 @@ def survey(task: MissionTask, team: Sequence[Member]) -> TeamPlan:
         One path per vehicle, certified together.
     """
     # One vehicle needs no share, and its legs are the path method's own.
-    if len(team) == 1:
-        (member,) = team
-        vehicle = member.vehicle
-        whole = Approach(task.space, vehicle.start, vehicle.recovery)
-        alone = (_covered(task, member, whole, task.site.area_m2),)
+    if len(team.members) == 1:
+        (member,) = team.members
+        alone = (_covered(task, member, task.space.free),)
         return TeamPlan(alone, _certified(task, alone))
     # Several: what each has to itself, how it gets there across the shares of others, and its path in there.
     assignment = _shared(task, team)
-    areas = {share.vehicle: share.area for share in assignment.shares}
-    harbour = Harbour(task.space, task.site.nominal_spacing_m)
-    vehicles = tuple(_shared_part(task, member, harbour, areas[member.vehicle.name]) for member in team)
+    shares = {share.vehicle: share for share in assignment.shares}
+    vehicles = tuple(_shared_part(task, member, shares[member.vehicle.name]) for member in team.members)
     return TeamPlan(vehicles, _certified(task, vehicles), assignment)
 
 
-def treatment(task: MissionTask) -> TeamPlan:
-    """Treat the hot spots: a sortie for each slave, as far as its length goes."""
-    team = {member.vehicle.name: member for member in task.site.team(Role.SLAVE)}
+def treatment(task: MissionTask, team: Team) -> TeamPlan:
+    """Treat the hot spots: a sortie for each vehicle, as far as its length goes.
+
+    Parameters
+    ----------
+    task
+        The mission, its site and its free space.
+    team
+        The vehicles that treat.
+
+    Returns
+    -------
+    TeamPlan
+        One path per vehicle that has a sortie, certified together.
+    """
+    members = {member.vehicle.name: member for member in team.members}
     request = AssignRequest(
         free=task.space.free,
         water=task.space.water,
-        vehicles=tuple(member.vehicle for member in team.values()),
+        vehicles=tuple(member.vehicle for member in team.members),
         hot_spots=task.site.hot_spots,
         swath_m=task.mission.treated_swath_m,
         danger_zones=task.site.danger_zones,
@@ -180,15 +197,14 @@ def treatment(task: MissionTask) -> TeamPlan:
         router=task.options.router,
         seed=task.options.seed,
     )
-    with renamed({"swath_m": "Swath" if task.mission.swath_m else "Minimal_spatial_rate"}):
-        assignment = task.call(ASSIGN, request)
+    assignment = task.call(ASSIGN, request)
     if not assignment.sorties:
         reasons = "; ".join(f"{left.hot_spot}: {left.reason}" for left in assignment.left)
         raise Infeasible(f"has no hot spot that can be treated ({reasons})", where="PriorModel")
     # Sorties that are made now, and those that come after them: both become paths in the same way.
     vehicles, further = (
         tuple(
-            VehiclePlan(member=team[sortie.vehicle], path=sortie.path, hot_spots=sortie.hot_spots)
+            VehiclePlan(member=members[sortie.vehicle], path=sortie.path, hot_spots=sortie.hot_spots)
             for sortie in sorties
         )
         for sorties in (assignment.sorties, assignment.further)
@@ -197,107 +213,103 @@ def treatment(task: MissionTask) -> TeamPlan:
     require_fit_to_follow(task.shore, task.site.frame, further)
     treated = {name for sortie in assignment.sorties for name in sortie.hot_spots}
     areas = tuple(spot.area for spot in task.site.hot_spots if spot.name in treated)
-    return TeamPlan(vehicles, _certified(task, vehicles, areas), assignment)
+    return TeamPlan(vehicles, _certified(task, vehicles, areas), assignment, treats=True)
 
 
-def expected_calls(mission: Mission) -> int:
-    """How many times stages are called to plan a mission."""
-    vehicles = [vehicle.role for vehicle in mission.vehicles or ()]
-    counts = {role: max(vehicles.count(role), 1) for role in Role}
-    # The contour first; then, for each vehicle, a decomposition and a path, for each team its shares and
-    # certificate.
-    calls = 1
-    for role in mission.mission_type.roles:
-        treats = role is Role.SLAVE and mission.hot_features
-        calls += 2 if treats else 2 * counts[role] + (2 if counts[role] > 1 else 1)
-    return calls
+def expected_calls(site: Site) -> int:
+    """How many times stages are called to plan a mission, for progress."""
+    contour = 1
+    return contour + sum(_expected_calls_of(team) for team in site.teams)
+
+
+def _expected_calls_of(team: Team) -> int:
+    certificate = assignment = 1
+    if team.treats:
+        return assignment + certificate
+    cells_and_path = 2 * len(team.members)
+    return cells_and_path + certificate + (assignment if len(team.members) > 1 else 0)
 
 
 # --------------------------------------------------------------------------- one question to a stage each
 
 
-def _shared(task: MissionTask, team: Sequence[Member]) -> Assignment:
+def _shared(task: MissionTask, team: Team) -> Assignment:
     """Share the free space out. A vehicle that surveys does a master's work, whatever its role."""
-    vehicles = tuple(msgspec.structs.replace(member.vehicle, role=Role.MASTER) for member in team)
+    vehicles = tuple(msgspec.structs.replace(member.vehicle, role=Role.MASTER) for member in team.members)
     request = AssignRequest(
         free=task.space.free,
         water=task.space.water,
         vehicles=vehicles,
         share_free=True,
+        spacing_m=task.site.nominal_spacing_m,
         footprint_m=task.mission.footprint_m,
         seed=task.options.seed,
     )
-    fields = {f"vehicle {each.vehicle.name!r}: length_m": each.fields["Master_length"] for each in team}
-    with renamed(fields | {"footprint_m": "Footprint"}):
-        return task.call(ASSIGN, request)
+    return task.call(ASSIGN, request)
 
 
-def _shared_part(task: MissionTask, member: Member, harbour: Harbour, share: Polygon) -> VehiclePlan:
-    with member.naming_fields():
-        approach = harbour.approach(share, member.vehicle)
-    return _covered(task, member, approach, share.area)
+def _shared_part(task: MissionTask, member: Member, share: Share) -> VehiclePlan:
+    """A path over a share, with the legs to it and home."""
+    plan = _covered(task, member, share.area, share.approach)
+    range_m, legs_m = member.vehicle.length_m, share.approach.legs_m
+    if legs_m <= FAR * range_m:
+        return plan
+    text = (
+        f"the way to its share and home takes {legs_m / range_m:.0%} of its {range_m:.0f} m: start it nearer, or"
+        " give it more length"
+    )
+    return replace(plan, warnings=(text, *plan.warnings))
 
 
-def _covered(task: MissionTask, member: Member, approach: Approach, water_m2: float) -> VehiclePlan:
-    """A path over all of a space, with the legs to it."""
-    with member.naming_fields():
-        # Legs across other shares are paid for first: the path in the share has what they leave.
-        length_m = approach.length_m(member.vehicle.length_m)
-        decomposition = _decomposed(task, member, approach.space, water_m2, length_m)
-        plan = _path(task, member, approach, decomposition, length_m)
-        path = approach.with_legs(plan.path)
-        return VehiclePlan(
-            member=member,
-            path=path,
-            heading_rad=decomposition.heading_rad,
-            spacing_m=plan.spacing_m,
-            area_m2=approach.space.free.area,
-            dropped=plan.dropped,
-            warnings=(
-                *approach.warnings(member.vehicle.length_m),
-                *plan.warnings,
-                *_unused(path, plan, member, length_m),
-            ),
-        )
+def _covered(task: MissionTask, member: Member, free: Polygon, approach: Approach | None = None) -> VehiclePlan:
+    """A path over a part of the free space, or all of it."""
+    space = msgspec.structs.replace(task.space, free=free)
+    with FieldNames.of_member(member).in_errors():
+        decomposition = _decomposed(task, member, free, approach)
+        plan = _path(task, member, space, decomposition, approach)
+    return VehiclePlan(
+        member=member,
+        path=plan.path,
+        heading_rad=decomposition.heading_rad,
+        spacing_m=plan.spacing_m,
+        area_m2=free.area,
+        dropped=plan.dropped,
+        warnings=plan.warnings,
+    )
 
 
-def _unused(path: LineString, plan: PathPlan, member: Member, length_m: float) -> tuple[str, ...]:
-    """A warning where legs turn out much shorter than the length kept for them, so that some of it is unused."""
-    share = path.length / member.vehicle.length_m
-    if share >= WELL_USED or plan.path.length < WELL_USED * length_m:
-        return ()
-    return (f"uses {share:.1%} of its longest length: its legs are shorter than what was kept for them",)
-
-
-def _decomposed(
-    task: MissionTask, member: Member, space: FreeSpace, water_m2: float, length_m: float
-) -> Decomposition:
-    # Of this vehicle's share and length alone: boats of a team may differ in both.
+def _decomposed(task: MissionTask, member: Member, free: Polygon, approach: Approach | None) -> Decomposition:
+    # A share is planned for its own water; alone, a vehicle is to cover all water, though only some of it is free.
+    water_m2 = task.site.area_m2 if approach is None else free.area
+    length_m = member.vehicle.length_m - (0.0 if approach is None else approach.legs_m)
     spacing_m = nominal_spacing_m(water_m2, length_m, task.mission.minimal_spatial_rate_m or 0.0)
-    request = DecomposeRequest(free=space.free, spacing_m=spacing_m, heading_rad=task.options.heading_rad)
+    request = DecomposeRequest(free=free, spacing_m=spacing_m, heading_rad=task.options.heading_rad)
     return task.call(DECOMPOSE, request, part=task.part(member))
 
 
 def _path(
-    task: MissionTask, member: Member, approach: Approach, decomposition: Decomposition, length_m: float
+    task: MissionTask,
+    member: Member,
+    space: FreeSpace,
+    decomposition: Decomposition,
+    approach: Approach | None,
 ) -> PathPlan:
     options = task.options
-    with renamed({"min_spacing_m": "Minimal_spatial_rate"}):
-        request = PathRequest(
-            method=options.method,
-            space=approach.space,
-            decomposition=decomposition,
-            launch=approach.launch,
-            recovery=approach.recovery,
-            length_m=length_m,
-            spent_m=member.vehicle.length_m - length_m,
-            min_spacing_m=task.mission.minimal_spatial_rate_m or 0.0,
-            seed=options.seed,
-            weighted_areas=task.site.weighted_areas,
-            time_limit_s=options.time_limit_s,
-            smooth=options.smooth,
-            draw=options.draw,
-        )
+    request = PathRequest(
+        method=options.method,
+        space=space,
+        decomposition=decomposition,
+        launch=member.vehicle.start,
+        recovery=member.vehicle.recovery,
+        approach=approach,
+        length_m=member.vehicle.length_m,
+        min_spacing_m=task.mission.minimal_spatial_rate_m or 0.0,
+        seed=options.seed,
+        weighted_areas=task.site.weighted_areas,
+        time_limit_s=options.time_limit_s,
+        smooth=options.smooth,
+        draw=options.draw,
+    )
     return task.call(PATH, request, part=task.part(member))
 
 

@@ -14,7 +14,7 @@ import msgspec
 
 from oxbow.contracts import DEFAULT_DEADLINE_S, MOST_DEADLINE_S, checked_id, require_finite
 from oxbow.contracts.ids import excerpt
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.mission.file import Mission, PlanOptions, mission_json, parse_mission
 
 __all__ = ["Submission", "SubmissionParameters"]
@@ -51,7 +51,7 @@ class SubmissionParameters(PlanOptions, frozen=True, kw_only=True, forbid_unknow
 
     @classmethod
     def parse(cls, parameters: Mapping[str, str]) -> SubmissionParameters:
-        """Read the text of parameters; `InvalidMission` names the one that is unknown or mistyped."""
+        """Read the text of parameters; `InvalidRequest` names the one that is unknown or mistyped."""
         try:
             # Not strict: the parameters of a query are text, those that are numbers as well.
             return msgspec.convert(dict(parameters), cls, strict=False)
@@ -59,7 +59,7 @@ class SubmissionParameters(PlanOptions, frozen=True, kw_only=True, forbid_unknow
             given = excerpt(";".join(f"{name}={value}" for name, value in parameters.items()))
             accepted = ", ".join(cls.__struct_fields__)
             reason = str(error)[:MOST_REASON_CHARACTERS]
-            raise InvalidMission(f"{reason}, in {given}; expected {accepted}", where="parameters") from error
+            raise InvalidRequest(f"{reason}, in {given}; expected {accepted}", where="parameters") from error
 
     @property
     def text(self) -> str:
@@ -84,7 +84,7 @@ class Submission:
 
     @classmethod
     def parse(cls, document: bytes, parameters: Mapping[str, str]) -> Submission:
-        """Read a query; `InvalidMission` where it cannot be read.
+        """Read a query; `InvalidMission` or `InvalidRequest` where it cannot be read.
 
         Parameters
         ----------

@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 from msgspec import structs
 from shapely import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import Place
 from oxbow.contracts import (
@@ -38,7 +39,7 @@ from oxbow.contracts import (
     Rule,
 )
 from oxbow.errors import Internal
-from oxbow.geometry.conformance import Shore, strays
+from oxbow.geometry.conformance import SHORE_TOLERANCE_M, Shore, strays
 from oxbow.geometry.frame import Frame
 from oxbow.geometry.sweep import from_sweep
 from oxbow.site.fleet import VehiclePlan
@@ -157,7 +158,11 @@ def _cell_faults(request: DecomposeRequest, reply: Decomposition) -> Iterator[st
 
 def _path_faults(request: PathRequest, reply: PathPlan) -> Iterator[str]:
     yield from _way_faults(reply.path, request.launch, request.recovery, request.length_m)
-    if stray := strays(reply.path, request.space.free, request.launch, request.recovery):
+    allowed: BaseGeometry = request.space.free
+    if request.approach is not None:
+        # Legs to a share run through the free water around it; they keep to it as nearly as they are judged.
+        allowed = shapely.union_all([allowed, *request.approach.water]).buffer(SHORE_TOLERANCE_M)
+    if stray := strays(reply.path, allowed, request.launch, request.recovery):
         place = stray[0].interpolate(0.5, normalized=True)
         yield f"the path leaves the free space, as at ({place.x:.1f}, {place.y:.1f}), and not as a leg"
 

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
 from shapely import LineString
 
 from oxbow.arrays import Place
 from oxbow.contracts import Assignment, Certificate, DroppedPart, Role, Vehicle
-from oxbow.errors import renamed
 from oxbow.geometry.frame import Position
 from oxbow.mission.file import Mission
 from oxbow.mission.vehicles import GivenVehicle
 
-__all__ = ["Member", "TeamPlan", "VehiclePlan", "members"]
+__all__ = ["Member", "Team", "TeamPlan", "VehiclePlan", "members"]
 
 Locate = Callable[[str, Position], Place]
 """Brings a position to the plane; the text is its field's name, for errors."""
+
+
+@dataclass(frozen=True)
+class MemberFields:
+    """The fields of the Mission File that say where a vehicle starts and ends, and how far it goes."""
+
+    start: str
+    recovery: str
+    length: str
 
 
 @dataclass(frozen=True)
@@ -32,30 +39,39 @@ class Member:
     start, recovery
         The same places as the Mission File has them.
     fields
-        The names in the Mission File of what stages call LaunchPoint, RecoveryPoint and Master_length.
+        Which fields of the Mission File say so.
+    is_named
+        Whether the Mission File names its vehicles.
     """
 
     vehicle: Vehicle
     start: Position
     recovery: Position
-    fields: dict[str, str]
-
-    @property
-    def is_named(self) -> bool:
-        """Whether the Mission File names its vehicles."""
-        return "LaunchPoint" in self.fields
-
-    def field(self, name: str) -> str:
-        """What the Mission File calls a field that stages know by this name."""
-        return self.fields.get(name, name)
+    fields: MemberFields
+    is_named: bool
 
     def with_name(self, warning: str) -> str:
         """A warning, with the name of the vehicle where the Mission File names its vehicles."""
         return f"{self.vehicle.name}: {warning}" if self.is_named else warning
 
-    def naming_fields(self) -> AbstractContextManager[None]:
-        """A context in which errors name this vehicle's fields of the Mission File."""
-        return renamed(self.fields)
+
+@dataclass(frozen=True)
+class Team:
+    """The vehicles of one role.
+
+    Parameters
+    ----------
+    role
+        Their role.
+    members
+        The vehicles.
+    treats
+        Whether they treat hot spots; else they survey.
+    """
+
+    role: Role
+    members: tuple[Member, ...]
+    treats: bool
 
 
 @dataclass(frozen=True)
@@ -98,11 +114,14 @@ class TeamPlan:
         Of all their paths together.
     assignment
         How the work was shared out; None where there was nothing to share.
+    treats
+        Whether they treat hot spots; else they survey.
     """
 
     vehicles: tuple[VehiclePlan, ...]
     certificate: Certificate
     assignment: Assignment | None = None
+    treats: bool = False
 
     @property
     def dropped(self) -> tuple[DroppedPart, ...]:
@@ -146,19 +165,21 @@ def members(mission: Mission, locate: Locate) -> tuple[Member, ...]:
 def _member_of_role(mission: Mission, role: Role, locate: Locate) -> Member:
     """The one vehicle of its role, which the mission does not name."""
     nameless = GivenVehicle(name=role.value, role=role)
-    fields = {"Master_length": f"{role.value.capitalize()}_length"}
-    return _member(mission, nameless, ("LaunchPoint", "RecoveryPoint"), fields, locate)
+    fields = MemberFields("LaunchPoint", "RecoveryPoint", f"{role.value.capitalize()}_length")
+    return _member(mission, nameless, fields, locate, is_named=False)
 
 
 def _given_member(mission: Mission, given: GivenVehicle, where: str, locate: Locate) -> Member:
-    start = "LaunchPoint" if given.start is None else f"{where}.Start"
-    recovery = "RecoveryPoint" if given.recovery is None else f"{where}.Recovery"
-    fields = {"LaunchPoint": start, "RecoveryPoint": recovery, "Master_length": f"{where}.Length"}
-    return _member(mission, given, (start, recovery), fields, locate)
+    fields = MemberFields(
+        start="LaunchPoint" if given.start is None else f"{where}.Start",
+        recovery="RecoveryPoint" if given.recovery is None else f"{where}.Recovery",
+        length=f"{where}.Length",
+    )
+    return _member(mission, given, fields, locate, is_named=True)
 
 
 def _member(
-    mission: Mission, given: GivenVehicle, names: tuple[str, str], fields: dict[str, str], locate: Locate
+    mission: Mission, given: GivenVehicle, fields: MemberFields, locate: Locate, *, is_named: bool
 ) -> Member:
     start = given.start or mission.launch
     recovery = given.recovery or mission.recovery or mission.launch
@@ -168,9 +189,9 @@ def _member(
         role=given.role,
         speed_mps=given.speed_mps or (mission.master_speed_mps if is_master else mission.slave_speed_mps),
         length_m=given.length_m or (mission.master_length_m if is_master else mission.slave_length_m),
-        start=locate(names[0], start),
-        recovery=locate(names[1], recovery),
+        start=locate(fields.start, start),
+        recovery=locate(fields.recovery, recovery),
         danger_factor=given.danger_factor or 1.0,
         danger_factors=given.danger_factors or {},
     )
-    return Member(vehicle, start, recovery, fields)
+    return Member(vehicle, start, recovery, fields, is_named)

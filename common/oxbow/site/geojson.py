@@ -14,7 +14,7 @@ import shapely
 
 from oxbow.arrays import FloatArray
 from oxbow.contracts import MAX_REQUEST_BYTES
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidMission, about_mission
 from oxbow.geometry.antimeridian import joined_at_antimeridian
 from oxbow.geometry.frame import Frame, Position
 from oxbow.mission.coordinates import GivenPolygon, lonlat_of, require_wgs84
@@ -126,6 +126,7 @@ class _Area:
         return float(shapely.Polygon(shell).area * np.cos(np.radians(shell[0, 1])))
 
 
+@about_mission()
 def mission_from_geojson(  # noqa: PLR0913 - one parameter for each field of the Mission File
     data: bytes,
     *,

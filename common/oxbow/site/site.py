@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import groupby
 
 import numpy as np
 import shapely
@@ -13,12 +15,12 @@ from shapely.geometry.base import BaseGeometry
 from oxbow.arrays import FloatArray, Place
 from oxbow.contracts import DANGER_DETOUR_M, DangerZone, HotSpot, Role, WeightedArea
 from oxbow.contracts.budget import nominal_spacing_m
-from oxbow.errors import Infeasible, InvalidMission
+from oxbow.errors import Infeasible, InvalidMission, about_mission
 from oxbow.geometry.frame import Frame, Position, lonlat
 from oxbow.mission.file import Mission, MissionType
 from oxbow.mission.unknown_fields import misspelt
 from oxbow.site.contours import MAX_RADIUS_M, Contour, Zone, danger_zones, forbidden_zones, require_points
-from oxbow.site.fleet import Member, members
+from oxbow.site.fleet import Member, Team, members
 from oxbow.site.hot_spots import HotSpots, hot_spots
 from oxbow.site.weights import weighted_areas
 
@@ -74,9 +76,17 @@ class Site:
     danger_detour_m: float = DANGER_DETOUR_M
     warnings: tuple[str, ...] = ()
 
-    def team(self, role: Role) -> tuple[Member, ...]:
-        """The vehicles of one role."""
-        return tuple(member for member in self.members if member.vehicle.role is role)
+    @cached_property
+    def teams(self) -> tuple[Team, ...]:
+        """The vehicles of each role, those who survey first. Without hot spots to treat, slaves survey too."""
+        return tuple(
+            Team(role, tuple(own), treats=role is Role.SLAVE and bool(self.hot_spots))
+            for role, own in groupby(self.members, key=lambda member: member.vehicle.role)
+        )
+
+    def team(self, role: Role) -> Team:
+        """The vehicles of one role, which is one of the mission's."""
+        return next(team for team in self.teams if team.role is role)
 
     @property
     def ends(self) -> dict[str, Place]:
@@ -84,6 +94,7 @@ class Site:
         return _ends(self.members)
 
     @classmethod
+    @about_mission()
     def of(cls, mission: Mission) -> Site:
         """Check a mission's geometry and bring it to planar metres.
 
@@ -192,9 +203,9 @@ def _hot_spots(mission: Mission, frame: Frame, outline: Polygon, water: BaseGeom
 
 def _nominal_spacing_m(mission: Mission, fleet: Sequence[Member], area_m2: float) -> float:
     least_m = mission.minimal_spatial_rate_m or 0.0
-    if mission.mission_type is MissionType.TREAT:
-        return mission.treated_swath_m or least_m
     lengths_m = [member.vehicle.length_m for member in fleet if member.vehicle.role is Role.MASTER]
+    if not lengths_m:
+        return mission.treated_swath_m or least_m
     return nominal_spacing_m(area_m2, sum(lengths_m), least_m)
 
 
@@ -206,8 +217,8 @@ def _idle_warnings(mission: Mission) -> tuple[str, ...]:
 
 
 def _ends(fleet: Sequence[Member]) -> dict[str, Place]:
-    starts = {member.field("LaunchPoint"): member.vehicle.start for member in fleet}
-    return starts | {member.field("RecoveryPoint"): member.vehicle.recovery for member in fleet}
+    starts = {member.fields.start: member.vehicle.start for member in fleet}
+    return starts | {member.fields.recovery: member.vehicle.recovery for member in fleet}
 
 
 def _require_near(name: str, place: Place, water: BaseGeometry, tolerance_m: float) -> None:

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from oxbow.bus.config import DEFAULT_ENDPOINT
 from oxbow.bus.session import Session
 from oxbow.contracts.ids import checked_id
-from oxbow.errors import InvalidMission, OxbowError, Unavailable
+from oxbow.errors import InvalidInput, OxbowError, Unavailable
 from oxbow.runtime.lifetime import Lifetime
 from oxbow.stage.service import Stage
 from oxbow.stage.worker import DEFAULT_MEMORY_MB, Worker
@@ -87,7 +87,7 @@ def _options(handler: str, argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--parent", type=int, help="end when this parent process has ended")
     try:
         return parser.parse_args(argv)
-    except InvalidMission as error:
+    except InvalidInput as error:
         parser.error(str(error))
 
 

@@ -6,7 +6,7 @@ import hashlib
 from collections import OrderedDict
 from dataclasses import dataclass
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.stage.wire import Done, Failed
 
 __all__ = ["Answered", "digest", "require_same"]
@@ -48,7 +48,7 @@ class Answered:
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             Another request has the same id.
         """
         kept = self._kept.get(request_id)
@@ -100,11 +100,11 @@ def require_same(request_id: str, known: bytes, request: bytes) -> None:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         The two differ.
     """
     if digest(request) != known:
-        raise InvalidMission(
+        raise InvalidRequest(
             f"is {request_id!r}, the id of another request; expected a unique id", where="request_id"
         )
 

@@ -16,7 +16,7 @@ from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import INTROSPECTION, MAX_REQUEST_BYTES, Endpoint, any_layer_key, layer_key
-from oxbow.errors import ErrorReply, Infeasible, Internal, InvalidMission, OxbowError, error_text
+from oxbow.errors import ErrorReply, Infeasible, Internal, InvalidInput, OxbowError, error_text
 from oxbow.stage.local import Handler
 from oxbow.stage.wire import Described, Done, Failed, FromWorker, Job, Shown
 from oxbow.stage.worker import needs_memory
@@ -84,7 +84,7 @@ class _Adapter:
 
     def _error(self, error: BaseException, request_id: str) -> OxbowError:
         """What to answer: the other kinds of `OxbowError` are about the bus, and no handler's to raise."""
-        if isinstance(error, InvalidMission | Infeasible | Internal):
+        if isinstance(error, InvalidInput | Infeasible | Internal):
             return error
         if is_memory_error(error):
             _log.error("%s: request %s needs more than %d MB", self.endpoint.stage, request_id, self.memory_mb)

@@ -22,7 +22,7 @@ from oxbow.errors import (
     DeadlineExceeded,
     ErrorReply,
     Internal,
-    InvalidMission,
+    InvalidRequest,
     OxbowError,
     Unavailable,
     error_text,
@@ -111,7 +111,7 @@ class Stage:
     def _envelope(self, query: Query) -> Envelope:
         size, most = query.size_bytes, self.described.most_request_bytes
         if size > most:
-            raise InvalidMission(f"is {size} bytes; at most {most}", where=self.described.stage)
+            raise InvalidRequest(f"is {size} bytes; at most {most}", where=self.described.stage)
         return Envelope.decode(query.attachment)
 
     def _enqueue(self, envelope: Envelope, query: Query) -> Done | Failed | None:
@@ -223,7 +223,7 @@ class Stage:
     def _refuse(self, key: str, _parameters: dict[str, str], _payload: bytes) -> Iterator[tuple[str, bytes]]:
         """Refuse queries for unknown keys: silence would look like a lost replica."""
         keys = (self.described.instance_key, *self.described.introspection_keys.values())
-        raise InvalidMission(f"is {excerpt(key)}; expected {', '.join(keys)}", where="key")
+        raise InvalidRequest(f"is {excerpt(key)}; expected {', '.join(keys)}", where="key")
 
     def _introspect(self, key: str, _parameters: dict[str, str], _payload: bytes) -> Iterator[tuple[str, bytes]]:
         answers = {"ping": self._ping, "info": self._info, "stats": self._stats, "schema": self._schema}

@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.wire.wkb import from_wkb
 
 __all__ = ["decode", "digest", "encode"]
@@ -98,7 +98,7 @@ def decode(data: bytes, kind: type[T]) -> T:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         The bytes are not such a message, or break one of its invariants; names the field.
     """
     try:
@@ -107,7 +107,7 @@ def decode(data: bytes, kind: type[T]) -> T:
         # msgspec reports the path only in the text of its error.
         match = _AT.fullmatch(str(error))
         problem, path = (match["problem"], f".{match['path']}") if match else (str(error), "")
-        raise InvalidMission(f"{problem[:1].lower()}{problem[1:]}", where=f"{kind.__name__}{path}") from error
+        raise InvalidRequest(f"{problem[:1].lower()}{problem[1:]}", where=f"{kind.__name__}{path}") from error
     # What else malformed bytes raise: text that is not UTF-8, nesting too deep, lengths beyond 64 bits.
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, OverflowError) as error:
-        raise InvalidMission(f"is not a valid MessagePack message: {error}", where=kind.__name__) from error
+        raise InvalidRequest(f"is not a valid MessagePack message: {error}", where=kind.__name__) from error

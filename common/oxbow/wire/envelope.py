@@ -8,7 +8,7 @@ import time
 import msgspec
 
 from oxbow.contracts.ids import MOST_ID_CHARACTERS, checked_id, excerpt
-from oxbow.errors import ErrorReply, InvalidMission
+from oxbow.errors import ErrorReply, InvalidRequest
 from oxbow.wire.strict_json import decode_json
 from oxbow.wire.waits import MOST_WAIT_S
 
@@ -38,7 +38,7 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         An id is not accepted (`oxbow.contracts.ids`), a number is not finite or out of bounds, or `part` is too
         long.
     """
@@ -56,17 +56,17 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             if getattr(self, field):
                 checked_id(getattr(self, field), field)
         if len(self.part) > MOST_ID_CHARACTERS:
-            raise InvalidMission(
+            raise InvalidRequest(
                 f"is {excerpt(self.part)}; expected at most {MOST_ID_CHARACTERS} characters", where="part"
             )
         # A deadline that has passed is valid: the request was late, not wrong, and is answered as such.
         if not (math.isfinite(self.deadline_s) and self.remaining_s() <= MOST_WAIT_S):
-            raise InvalidMission(
+            raise InvalidRequest(
                 f"is {self.deadline_s!r}; expected Unix time in s, at most {MOST_WAIT_S:g} s from now",
                 where="deadline_s",
             )
         if self.origin is not None and not (abs(self.origin[0]) <= 90.0 and abs(self.origin[1]) <= 540.0):
-            raise InvalidMission(f"is {self.origin!r}; expected latitude and longitude in degrees", where="origin")
+            raise InvalidRequest(f"is {self.origin!r}; expected latitude and longitude in degrees", where="origin")
 
     @classmethod
     def decode(cls, data: bytes) -> Envelope:
@@ -74,12 +74,12 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             The bytes are not an envelope, or too many.
         """
         # Before anything is decoded: the size is all that is known of it.
         if len(data) > MOST_ENVELOPE_BYTES:
-            raise InvalidMission(f"is {len(data)} bytes; at most {MOST_ENVELOPE_BYTES}", where="attachment")
+            raise InvalidRequest(f"is {len(data)} bytes; at most {MOST_ENVELOPE_BYTES}", where="attachment")
         return decode_json(data, cls, "attachment")
 
     def remaining_s(self) -> float:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import msgspec
 from msgspec import inspect
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 
 __all__ = ["decode_json", "document_of", "json_names", "part_with_extra", "utf8", "with_extra"]
 
@@ -51,7 +51,7 @@ def utf8(data: bytes, name: str) -> bytes:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         It is not text in the encoding that its mark says.
     """
     for mark, encoding in _BYTE_ORDER_MARKS.items():
@@ -63,7 +63,7 @@ def utf8(data: bytes, name: str) -> bytes:
         try:
             return text.decode(encoding).encode()
         except UnicodeError as error:
-            raise InvalidMission(f"is not {encoding.upper()}, as its byte order mark says", where=name) from error
+            raise InvalidRequest(f"is not {encoding.upper()}, as its byte order mark says", where=name) from error
     return data
 
 
@@ -88,7 +88,7 @@ def decode_json(data: bytes, kind: type[T], name: str, *, at: str = "") -> T:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         `data` is not JSON (the message gives the line and its text) or not of this kind (the error names the field
         with its index, its value and what would be accepted).
     """
@@ -97,12 +97,12 @@ def decode_json(data: bytes, kind: type[T], name: str, *, at: str = "") -> T:
     except msgspec.DecodeError as error:
         # msgspec calls an empty document truncated input, which helps nobody who sent an empty file.
         if not data.strip():
-            raise InvalidMission("is empty; expected JSON", where=name) from error
-        raise InvalidMission(f"is not JSON: {_located(str(error), data)}", where=name) from error
+            raise InvalidRequest("is empty; expected JSON", where=name) from error
+        raise InvalidRequest(f"is not JSON: {_located(str(error), data)}", where=name) from error
     except UnicodeDecodeError as error:
-        raise InvalidMission("is not JSON: a string is not UTF-8", where=name) from error
+        raise InvalidRequest("is not JSON: a string is not UTF-8", where=name) from error
     except RecursionError as error:
-        raise InvalidMission("is nested too deeply to be read", where=name) from error
+        raise InvalidRequest("is nested too deeply to be read", where=name) from error
 
 
 def _decoded(data: bytes, kind: type[T], name: str, at: str) -> T:
@@ -157,7 +157,7 @@ def part_with_extra(data: bytes, kind: type[msgspec.Struct], name: str, *, is_li
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         `data` begins like such an object or list, and is not JSON; or an element of the list is no object.
     """
     if not data.startswith(b"[" if is_list else b"{"):
@@ -193,18 +193,18 @@ def _located(problem: str, data: bytes) -> str:
     return f"{problem[: match.start()]} on line {line}, in {' '.join(seen.split())!r}{hint}"
 
 
-def _mistyped(text: str, data: bytes, kind: Any, name: str, at: str) -> InvalidMission:
+def _mistyped(text: str, data: bytes, kind: Any, name: str, at: str) -> InvalidRequest:
     match = _MISTYPED.fullmatch(text)
     problem, path = (match["problem"], match["path"] or "") if match else (text, "")
     missing, unknown = _MISSING.fullmatch(problem), _UNKNOWN.fullmatch(problem)
     inner = f"{path}.{missing[1]}".lstrip(".") if missing else path
     where = (f"{at}{inner}" if inner.startswith("[") else f"{at}.{inner}").strip(".") or name
     if missing:
-        return InvalidMission("is missing; it is required", where=where)
+        return InvalidRequest("is missing; it is required", where=where)
     accepted = _described(_type_at(kind, path))
     if unknown:
-        return InvalidMission(f"has a field {unknown[1]!r}; expected {accepted} and nothing else", where=where)
-    return InvalidMission(f"is {_text_at(path, data)}; expected {accepted}", where=where)
+        return InvalidRequest(f"has a field {unknown[1]!r}; expected {accepted} and nothing else", where=where)
+    return InvalidRequest(f"is {_text_at(path, data)}; expected {accepted}", where=where)
 
 
 def _steps(path: str) -> Iterator[re.Match[str]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidOption
 
 __all__ = ["MOST_WAIT_S", "checked_wait"]
 
@@ -27,10 +27,10 @@ def checked_wait(seconds: float, where: str) -> float:
 
     Raises
     ------
-    InvalidMission
+    InvalidOption
         It is not a number from 0 to `MOST_WAIT_S`.
     """
     # Negated, so that NaN is refused.
     if not 0.0 <= seconds <= MOST_WAIT_S:
-        raise InvalidMission(f"is {seconds!r} s; expected 0 to {MOST_WAIT_S:g} s", where=where)
+        raise InvalidOption(f"is {seconds!r} s; expected 0 to {MOST_WAIT_S:g} s", where=where)
     return seconds

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import dijkstra
 from shapely import Polygon
 
 from oxbow.arrays import FloatArray, Indices, Mask, Place
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow_assignment.shares.balancing import balanced_shares, border_lengths_m, imbalance
 from oxbow_assignment.shares.mesh import Mesh, propagate
 
@@ -134,7 +134,7 @@ def wavefront_partition(mesh: Mesh, starts: Sequence[Place], capacities: FloatAr
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         There are no vehicles or more than triangles, or a capacity is not positive.
     """
     capacities = _checked(mesh, starts, capacities)
@@ -171,7 +171,7 @@ def balanced_partition(
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         There are no vehicles or more than triangles, or a capacity is not positive.
     """
     capacities = _checked(mesh, starts, capacities)
@@ -212,12 +212,12 @@ def rebalanced(partition: Partition, capacities: FloatArray, allowed: Mask) -> P
 def _checked(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None) -> FloatArray:
     capacities = np.ones(len(starts)) if capacities is None else np.asarray(capacities, dtype=float)
     if not 0 < len(starts) <= len(mesh):
-        raise InvalidMission(f"are {len(starts)}; expected 1 to {len(mesh)}, one per triangle", where="Vehicles")
+        raise InvalidRequest(f"are {len(starts)}; expected 1 to {len(mesh)}, one per triangle", where="starts")
     if len(capacities) != len(starts):
-        raise InvalidMission(f"are {len(starts)}, with {len(capacities)} capacities", where="Vehicles")
+        raise InvalidRequest(f"are {len(starts)}, with {len(capacities)} capacities", where="starts")
     for vehicle, capacity in enumerate(capacities.tolist()):
         if not 0.0 < capacity < np.inf:
-            raise InvalidMission(f"has a capacity of {capacity!r}; expected > 0", where=f"Vehicles[{vehicle}]")
+            raise InvalidRequest(f"has a capacity of {capacity!r}; expected > 0", where=f"capacities[{vehicle}]")
     return capacities
 
 

@@ -79,8 +79,9 @@ class Reach:
         # The legs: from where each vehicle starts and is recovered to the free space.
         shore = leg_routes(free, free if water is None else water)
         ways = [
-            way_to(free, shore, place)
-            for place in (*(each.start for each in vehicles), *(each.recovery for each in vehicles))
+            way_to(free, shore, getattr(vehicle, end), where=vehicle.field(end))
+            for end in ("start", "recovery")
+            for vehicle in vehicles
         ]
         legs_m = np.array([LineString(way).length for way in ways])
         docks = np.array([way[-1] for way in ways])
@@ -161,5 +162,5 @@ class Reach:
                     way_m,
                     what="the way to the nearest water and home",
                     reserve=SPARE,
-                    where=f"vehicle {vehicle.name!r}: length_m",
+                    where=vehicle.field("length_m"),
                 )

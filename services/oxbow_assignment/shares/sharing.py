@@ -17,7 +17,7 @@ from shapely import Polygon
 
 from oxbow.arrays import FloatArray, Mask, Place
 from oxbow.contracts import DroppedPart, Vehicle
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow_assignment.shares.balancing import imbalance
 from oxbow_assignment.shares.mesh import Mesh, mesh_area, propagate
 from oxbow_assignment.shares.partition import (
@@ -103,13 +103,13 @@ def share_water(
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         There is no master, or the footprint is so small that meshing would take minutes.
     Infeasible
         A master cannot reach any of the free space and be home within its range.
     """
     if not masters:
-        raise InvalidMission("has no master; expected one or more to share the free space", where="vehicles")
+        raise InvalidRequest("has no master; expected one or more to share the free space", where="vehicles")
     if len(masters) == 1:
         return Sharing((free,))
     mesh = mesh_area(free, _footprint_m(free, len(masters), footprint_m))
@@ -140,7 +140,7 @@ def _footprint_m(free: Polygon, masters: int, footprint_m: float | None) -> floa
     if footprint_m is None:
         return _edge_m(free, TRIANGLES * masters)
     if footprint_m < (least_m := _edge_m(free, MOST_TRIANGLES)):
-        raise InvalidMission(
+        raise InvalidRequest(
             f"is {footprint_m:g} m; for this water expected {least_m:.3g} m or more, or none", where="footprint_m"
         )
     return footprint_m

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from oxbow.arrays import Indices
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow_assignment.targets.assignment import TargetAssignment, assignment_of
 from oxbow_assignment.targets.clustering import Clusters, cluster_by_radius, fuzzy_c_means, k_means
 from oxbow_assignment.targets.exchange import with_exchanges
@@ -55,7 +55,7 @@ class Clustering:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         A number or a radius is missing, out of place or not positive.
     """
 
@@ -68,15 +68,15 @@ class Clustering:
     def __post_init__(self) -> None:
         by_radius = self.method is ClusterMethod.RADIUS
         if by_radius != (self.radius_m is not None):
-            raise InvalidMission(
+            raise InvalidRequest(
                 f"is {self.radius_m!r}; expected a number >= 0 for method {ClusterMethod.RADIUS.value!r} and none"
                 f" for another; the method is {self.method.value!r}",
                 where="radius_m",
             )
         if self.k is not None and (by_radius or self.k < 1):
-            raise InvalidMission(f"is {self.k}; expected 1 or more, and none with a radius", where="k")
+            raise InvalidRequest(f"is {self.k}; expected 1 or more, and none with a radius", where="k")
         if self.starts < 1:
-            raise InvalidMission(f"is {self.starts}; expected 1 or more", where="starts")
+            raise InvalidRequest(f"is {self.starts}; expected 1 or more", where="starts")
 
 
 @dataclass(frozen=True)

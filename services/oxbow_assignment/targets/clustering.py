@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from oxbow.arrays import FloatArray, Indices
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow_assignment.targets.pseudo_coordinates import PseudoCoordinates
 
 __all__ = ["Clusters", "cluster_by_radius", "fading_weights", "fuzzy_c_means", "k_means", "mean_distances"]
@@ -71,11 +71,11 @@ def fading_weights(since_visit_s: FloatArray, fade_s: float) -> FloatArray:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         `fade_s` is not positive.
     """
     if not fade_s > 0.0:
-        raise InvalidMission(f"is {fade_s!r} s; expected a number > 0", where="fade_s")
+        raise InvalidRequest(f"is {fade_s!r} s; expected a number > 0", where="fade_s")
     share = np.clip(np.nan_to_num(since_visit_s, nan=0.0) / fade_s, 0.0, 1.0)
     weights: FloatArray = 0.5 * (1.0 + np.cos(np.pi * share))
     return weights
@@ -111,7 +111,7 @@ def k_means(
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         More clusters than targets, or weights outside [0, 1].
     """
     places, weights = coordinates.places, _checked_weights(coordinates, weights)
@@ -152,7 +152,7 @@ def fuzzy_c_means(
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         More clusters than targets, or weights outside [0, 1].
     """
     places, weights = coordinates.places, _checked_weights(coordinates, weights)
@@ -197,11 +197,11 @@ def cluster_by_radius(
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         A radius that is negative or not a number, or weights outside [0, 1].
     """
     if not radius_m >= 0.0:
-        raise InvalidMission(f"is {radius_m!r} m; expected a number >= 0", where="radius_m")
+        raise InvalidRequest(f"is {radius_m!r} m; expected a number >= 0", where="radius_m")
     weights = _checked_weights(coordinates, weights)
     centres = np.average(coordinates.places, axis=0, weights=weights if weights.any() else None)[None, :]
     while True:
@@ -291,10 +291,10 @@ def _checked_weights(coordinates: PseudoCoordinates, weights: FloatArray | None)
     if weights is None:
         return np.ones(count)
     if weights.shape != (count,) or not ((weights >= 0.0) & (weights <= 1.0)).all():
-        raise InvalidMission(f"expected {count} numbers from 0 to 1, one per target", where="weights")
+        raise InvalidRequest(f"expected {count} numbers from 0 to 1, one per target", where="weights")
     return weights
 
 
 def _require_k(k: int, count: int) -> None:
     if not 1 <= k <= count:
-        raise InvalidMission(f"is {k}; expected 1 to {count}, the number of targets", where="k")
+        raise InvalidRequest(f"is {k}; expected 1 to {count}, the number of targets", where="k")

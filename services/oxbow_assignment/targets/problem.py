@@ -15,7 +15,7 @@ import numpy as np
 
 from oxbow.arrays import FloatArray, Indices, Mask
 from oxbow.contracts import Role, Vehicle
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 
 __all__ = ["COST", "LENGTH", "SUM_ROUNDING", "Objective", "Problem", "require_distances"]
 
@@ -68,7 +68,7 @@ class Problem:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         A field breaks these rules.
     """
 
@@ -84,7 +84,7 @@ class Problem:
         for own in self.distances.reshape(-1, *self.distances.shape[-2:]):
             require_distances(own)
         if self.distances.shape[-1] < 2 * len(self.vehicles):
-            raise InvalidMission(
+            raise InvalidRequest(
                 f"has {self.distances.shape[-1]} rows; expected at least {2 * len(self.vehicles)}:"
                 f" a start and a recovery for each of {len(self.vehicles)} vehicles",
                 where="distances",
@@ -92,9 +92,9 @@ class Problem:
         if not len(self.values):
             object.__setattr__(self, "values", np.ones(self.count))
         if self.values.shape != (self.count,) or not (np.isfinite(self.values) & (self.values > 0)).all():
-            raise InvalidMission(f"expected {self.count} finite numbers > 0, one per target", where="values")
+            raise InvalidRequest(f"expected {self.count} finite numbers > 0, one per target", where="values")
         if len(self.roles) not in (0, self.count):
-            raise InvalidMission(f"has {len(self.roles)}; expected {self.count}, one per target", where="roles")
+            raise InvalidRequest(f"has {len(self.roles)}; expected {self.count}, one per target", where="roles")
 
     @property
     def count(self) -> int:
@@ -230,15 +230,15 @@ def _require_vehicles(vehicles: Sequence[Vehicle]) -> None:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         There are none, or two have the same name.
     """
     if not vehicles:
-        raise InvalidMission("is empty; expected at least one vehicle", where="vehicles")
+        raise InvalidRequest("is empty; expected at least one vehicle", where="vehicles")
     names = [vehicle.name for vehicle in vehicles]
     for name in names:
         if names.count(name) > 1:
-            raise InvalidMission(
+            raise InvalidRequest(
                 f"{names.count(name)} vehicles are named {name!r}; expected one", where="vehicles"
             )
 
@@ -248,11 +248,11 @@ def require_distances(distances: FloatArray) -> None:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         Names the first entry that is wrong, and what would be accepted.
     """
     if distances.ndim != 2 or distances.shape[0] != distances.shape[1]:
-        raise InvalidMission(f"has shape {distances.shape}; expected a square matrix", where="distances")
+        raise InvalidRequest(f"has shape {distances.shape}; expected a square matrix", where="distances")
     bad = ~(distances >= 0.0)  # not `< 0.0`, which lets NaN pass
     bad[np.diag_indices(len(distances))] |= np.diag(distances) != 0.0
     # Infinite both ways is symmetric, but inf - inf is NaN: -1 stands for it, which no distance is.
@@ -266,7 +266,7 @@ def require_distances(distances: FloatArray) -> None:
     ):
         if wrong.any():
             i, j = np.argwhere(wrong)[0].tolist()
-            raise InvalidMission(
+            raise InvalidRequest(
                 f"is {distances[i, j]:g} m and back {distances[j, i]:g} m; expected {expected}",
                 where=f"distances[{i}, {j}]",
             )

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.distance import pdist, squareform
 
 from oxbow.arrays import FloatArray
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow_assignment.targets.problem import require_distances
 
 __all__ = ["PseudoCoordinates", "pseudo_coordinates"]
@@ -55,12 +55,12 @@ def pseudo_coordinates(distances: FloatArray) -> PseudoCoordinates:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         No targets, or distances that are not finite or not symmetric.
     """
     require_distances(distances)
     if not len(distances) or not np.isfinite(distances).all():
-        raise InvalidMission(
+        raise InvalidRequest(
             f"has shape {distances.shape}; expected finite distances of at least one target", where="distances"
         )
     columns = distances / np.sqrt(len(distances))

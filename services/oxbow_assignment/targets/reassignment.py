@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from oxbow.arrays import Indices
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow_assignment.targets.assign import mended_paths
 from oxbow_assignment.targets.assignment import TargetAssignment, assignment_of
 from oxbow_assignment.targets.insertion import trimmed_path
@@ -66,11 +66,11 @@ def reassign(problem: Problem, tours: Sequence[Sequence[int]], *, hysteresis_s: 
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         The tours do not fit the problem, or the hysteresis is negative or not a number.
     """
     if not hysteresis_s >= 0.0:
-        raise InvalidMission(f"is {hysteresis_s!r} s; expected a number >= 0", where="hysteresis_s")
+        raise InvalidRequest(f"is {hysteresis_s!r} s; expected a number >= 0", where="hysteresis_s")
     _require_tours(problem, tours)
     paths = [
         trimmed_path(problem, vehicle, problem.path(vehicle, tour), held=1) for vehicle, tour in enumerate(tours)
@@ -132,9 +132,9 @@ def _first(path: Indices) -> int | None:
 
 def _require_tours(problem: Problem, tours: Sequence[Sequence[int]]) -> None:
     if len(tours) != len(problem.vehicles):
-        raise InvalidMission(f"has {len(tours)}; expected {len(problem.vehicles)}, one per vehicle", where="tours")
+        raise InvalidRequest(f"has {len(tours)}; expected {len(problem.vehicles)}, one per vehicle", where="tours")
     for target, times in Counter(target for tour in tours for target in tour).items():
         if not 0 <= target < problem.count:
-            raise InvalidMission(f"has target {target}; expected 0 to {problem.count - 1}", where="tours")
+            raise InvalidRequest(f"has target {target}; expected 0 to {problem.count - 1}", where="tours")
         if times > 1:
-            raise InvalidMission(f"visits target {target} {times} times; expected once", where="tours")
+            raise InvalidRequest(f"visits target {target} {times} times; expected once", where="tours")

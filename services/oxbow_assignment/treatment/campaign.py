@@ -125,7 +125,7 @@ def plan_campaign(
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         Hot spots overlap, share a name or have no value; there is no slave; or the swath is far too small.
     Infeasible
         A slave's range is too short to reach the free space and go home, or it would take hundreds of sorties.

@@ -19,7 +19,7 @@ from shapely import LineString, Polygon
 
 from oxbow.arrays import FloatArray, Indices
 from oxbow.contracts import Vehicle
-from oxbow.errors import Infeasible, InvalidMission
+from oxbow.errors import Infeasible, InvalidRequest
 from oxbow.geometry.route import NO_DANGER, Danger, RouteMethod, Router, RouteTable, leg_routes, way_to
 from oxbow.geometry.route.mesh import WaterMesh
 from oxbow.geometry.route.methods import router_on
@@ -176,22 +176,25 @@ class Fleet:
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             There is no slave.
         Infeasible
             A slave's range is too short to reach the free space and go home.
         """
         if not slaves:
-            raise InvalidMission("has no slave; expected one or more to treat the hot spots", where="vehicles")
+            raise InvalidRequest("has no slave; expected one or more to treat the hot spots", where="vehicles")
         shore = leg_routes(free, water)
-        out = tuple(LineString(way_to(free, shore, slave.start)) for slave in slaves)
-        home = tuple(LineString(way_to(free, shore, slave.recovery)[::-1]) for slave in slaves)
+        out = tuple(LineString(way_to(free, shore, slave.start, where=slave.field("start"))) for slave in slaves)
+        home = tuple(
+            LineString(way_to(free, shore, slave.recovery, where=slave.field("recovery"))[::-1])
+            for slave in slaves
+        )
         for slave, leg, back in zip(slaves, out, home, strict=True):
             if leg.length + back.length >= slave.length_m:
                 raise Infeasible(
                     f"lies {leg.length:.0f} m outside the free space, and the recovery {back.length:.0f} m;"
                     f" expected less than the vehicle's {slave.length_m:.0f} m in all",
-                    where=f"vehicle {slave.name!r}: start",
+                    where=slave.field("start"),
                 )
         return cls(tuple(slaves), free, water, danger, method, out, home)
 

@@ -10,7 +10,7 @@ from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import HotSpot
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.site.hot_spots import first_overlap
 
 __all__ = ["require_treatable", "waters"]
@@ -24,21 +24,21 @@ def require_treatable(spots: Sequence[HotSpot]) -> None:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         Names the hot spots, and the value, or the area in which they overlap.
     """
     for name, count in Counter(spot.name for spot in spots).items():
         if count > 1:
-            raise InvalidMission(f"has {name!r} {count} times; expected once", where="hot_spots")
+            raise InvalidRequest(f"has {name!r} {count} times; expected once", where="hot_spots")
     for spot in spots:
         if spot.value <= 0.0:
-            raise InvalidMission(
+            raise InvalidRequest(
                 f"of hot spot {spot.name!r} is {spot.value:g}; expected > 0: where not all can be treated, value"
                 " per metre comes first",
                 where="value",
             )
     if overlap := first_overlap(spots):
-        raise InvalidMission(
+        raise InvalidRequest(
             f"hot spots {overlap.one.name!r} and {overlap.other.name!r} overlap in {overlap.area_m2:.4g} m2;"
             " expected separate areas",
             where="hot_spots",

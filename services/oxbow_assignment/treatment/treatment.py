@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import FloatArray, Indices
 from oxbow.contracts import HotSpot
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.geometry.route import Router
 from oxbow_assignment.targets.ordering import improved_path
 from oxbow_assignment.treatment.lines import chained_line
@@ -84,7 +84,7 @@ def treatment_of(spot: HotSpot, water: BaseGeometry, free: Polygon, router: Rout
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         The swath is so small that the hot spot would take thousands of passes.
     """
     _require_few(passes_needed(water, swath_m), spot, swath_m)
@@ -103,7 +103,7 @@ def treatment_of(spot: HotSpot, water: BaseGeometry, free: Polygon, router: Rout
 
 def _require_few(passes: int, spot: HotSpot, swath_m: float) -> None:
     if passes > MOST_PASSES:
-        raise InvalidMission(
+        raise InvalidRequest(
             f"is {swath_m:g} m: hot spot {spot.name!r} would take {passes} passes; expected"
             f" {swath_m * passes / MOST_PASSES:.3g} m or more",
             where="swath_m",

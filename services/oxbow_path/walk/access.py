@@ -12,7 +12,6 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
 from oxbow.arrays import FloatArray, Place
-from oxbow.errors import renamed
 from oxbow.geometry.route import Landing, way_to
 from oxbow.geometry.route.gate_routes import Routes, taut
 from oxbow.tolerances import HAIR_M, ON_SHORE_M, ROUNDING_M
@@ -97,7 +96,7 @@ def access(place: Place, free: Polygon, water: Routes, *, where: str) -> Access:
     water
         Ways through the water that the free space lies in.
     where
-        What errors name the point by: `LaunchPoint` or `RecoveryPoint`.
+        What errors call the point.
 
     Returns
     -------
@@ -112,8 +111,7 @@ def access(place: Place, free: Polygon, water: Routes, *, where: str) -> Access:
     if free.covers(Point(place)):
         return Access(np.array([place, place]))
     landing = Landing.of(place, water.water)
-    with renamed({"LaunchPoint": where}):
-        way = way_to(free, water, landing.berth)
+    way = way_to(free, water, landing.berth, where=where)
     if len(way) > 2:
         way = _pulled_tight(way, free, water.water)
     leg = landing.onward(way)

@@ -4,7 +4,7 @@ Equal points give one closed ring: out at one place, back in beside it. Points a
 travels the whole ring: round one side of the region from launch to recovery, back through its middle, and
 round the other side. (The report, Rendas and Li 2016, section 1.2.1.2, treats only equal points.)
 
-`oxbow.planning.approach` makes legs of another kind, from gate to gate: both ways run beside a middle line, in
+`oxbow_path.approach` makes legs of another kind, from gate to gate: both ways run beside a middle line, in
 water wide enough for them. Here a leg ends on the ring, and the way back opens from nothing, however narrow the
 water.
 """
@@ -122,7 +122,7 @@ def path_with_legs(
         # Another detail makes another triangulation, whose way may keep clear of what this one touched.
         opening_m, detail_m = opening_m / 2, detail_m * OTHER_DETAIL
     # Nothing fits. A winding leg is the mission's fault; a straight one leaves room: the construction failed.
-    for leg, where in ((launch, "LaunchPoint"), (recovery, "RecoveryPoint")):
+    for leg, where in ((launch, "launch"), (recovery, "recovery")):
         if leg.winds:
             raise Infeasible(
                 "can be reached only through water too narrow for a way back beside the way out", where

@@ -18,7 +18,7 @@ from oxbow import Client
 from oxbow.bus.client import Bus
 from oxbow.bus.router import start_router
 from oxbow.contracts import PLAN_KEY, MissionState, MissionStatus, live_key, mission_key
-from oxbow.errors import Cancelled, ErrorCode, Internal, InvalidMission, OxbowError
+from oxbow.errors import Cancelled, ErrorCode, Internal, InvalidRequest, OxbowError
 from oxbow.mission.file import mission_json, parse_mission
 from oxbow.planning.submission import Submission
 from tests.support.mission_files import listening, mission_file, revision_of
@@ -267,7 +267,7 @@ def test_a_mission_can_be_cancelled_while_it_waits_and_while_it_is_planned(clien
 def test_what_is_done_stays_done_and_what_is_unknown_is_said_to_be(client: Client) -> None:
     client.plan(mission_file(), mission_id="already-done")
     assert client.cancel("already-done").state is MissionState.DONE
-    with pytest.raises(InvalidMission, match="not kept"):
+    with pytest.raises(InvalidRequest, match="not kept"):
         client.cancel("unheard-of")
 
 

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from oxbow.contracts import layer_key, live_key, mission_key
 from oxbow.contracts.ids import MOST_ID_CHARACTERS, checked_id
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 
 
 @pytest.mark.parametrize("text", ["lake", "a", "_", "-", "0f5c.1c2e-9", "x" * MOST_ID_CHARACTERS])
@@ -28,7 +28,7 @@ def test_an_id_is_taken_as_it_is(text: str) -> None:
     ],
 )
 def test_what_is_no_id_is_refused_by_name(text: str, message: str) -> None:
-    with pytest.raises(InvalidMission, match=f"mission: {message}") as caught:
+    with pytest.raises(InvalidRequest, match=f"mission: {message}") as caught:
         checked_id(text, where="mission")
     assert len(str(caught.value)) < 250
 
@@ -37,7 +37,7 @@ def test_what_is_no_id_is_refused_by_name(text: str, message: str) -> None:
 def test_every_key_has_the_chunks_it_should_have(text: str) -> None:
     try:
         keys = [mission_key(text, "plan"), live_key("path", text), layer_key(text, "path", text)]
-    except InvalidMission:
+    except InvalidRequest:
         return
     assert [key.count("/") for key in keys] == [4, 4, 5]
     assert all(len(key) < 400 and not {"*", "?", "#", "@"} & set(key) for key in keys)

@@ -9,7 +9,7 @@ import shapely
 from shapely import box
 
 from oxbow.contracts import DANGER_DETOUR_M, AssignRequest, Per, Vehicle
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidMission, InvalidRequest
 from oxbow.mission.file import mission_json, parse_mission
 from oxbow.site.site import Site
 from tests.support.project import SCHEMA
@@ -134,7 +134,7 @@ def test_the_schema_accepts_and_refuses_what_the_parser_does():
 def test_messages_refuse_what_is_out_of_range():
     boat = {"name": "tern", "length_m": 100.0, "start": (0.0, 0.0), "recovery": (0.0, 0.0)}
     for factor in (0.9, math.nan, math.inf):
-        with pytest.raises(InvalidMission, match=r"'tern': danger_factor: is .* >= 1"):
+        with pytest.raises(InvalidRequest, match=r"'tern': danger_factor: is .* >= 1"):
             Vehicle(**boat, danger_factor=factor)
-    with pytest.raises(InvalidMission, match=r"danger_detour_m: is -1\.0"):
+    with pytest.raises(InvalidRequest, match=r"danger_detour_m: is -1\.0"):
         AssignRequest(free=box(0, 0, 1, 1), vehicles=(Vehicle(**boat),), danger_detour_m=-1.0)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from shapely import LineString, MultiPoint, MultiPolygon, Point, Polygon, box
 
 from oxbow.contracts import Variogram, VariogramModel
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidMission, InvalidRequest
 from oxbow.mission.file import mission_json, parse_mission
 from oxbow.mission.plan import PlanOptions
 from oxbow.mission.prior import PriorFeature, PriorModel, parse_prior, prior_document
@@ -121,7 +121,7 @@ def test_numbers_made_in_python_are_checked_too(wrong):
         with pytest.raises(InvalidMission, match=name):
             PriorFeature(geometry=NEAR, **{name: wrong})
     for name in ("range_m", "sill", "nugget"):
-        with pytest.raises(InvalidMission, match=name):
+        with pytest.raises(InvalidRequest, match=name):
             Variogram(**CLAY | {name: wrong})
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from shapely import MultiPolygon, box
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidMission, InvalidOption
 from oxbow.mission.prior_file import read_prior
 from oxbow.mission.raster import MAX_CELLS, Raster
 
@@ -130,7 +130,7 @@ def test_a_byte_order_mark_is_skipped(written, text, name, encoding):
 
 
 def test_a_missing_file_is_refused_with_its_name(tmp_path):
-    with pytest.raises(InvalidMission, match="cannot be read"):
+    with pytest.raises(InvalidOption, match="cannot be read"):
         read_prior(tmp_path / "prior.asc")
 
 

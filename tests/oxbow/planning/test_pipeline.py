@@ -86,7 +86,7 @@ def planned(given, options=OPTIONS):
     """The completed mission, after what holds of every plan was checked."""
     calls = Calls()
     completed = plan_mission(given, options, call=calls)
-    assert len(calls.stages) == expected_calls(given)
+    assert len(calls.stages) == expected_calls(Site.of(given))
     assert parse_mission(mission_json(completed)) == completed
     judged = evaluate(completed)
     for vehicle in judged.vehicles:

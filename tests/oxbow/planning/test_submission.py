@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from oxbow.contracts import Method, checked_id
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.mission.file import Position
 from oxbow.planning.submission import Submission, SubmissionParameters
 
@@ -110,6 +110,6 @@ def test_parameters_survive_the_way_through_a_selector(given_parameters: Submiss
     ],
 )
 def test_what_is_wrong_with_parameters_is_told(parameters: dict[str, str], message: str) -> None:
-    with pytest.raises(InvalidMission, match=message) as raised:
+    with pytest.raises(InvalidRequest, match=message) as raised:
         submission(**parameters)
     assert len(str(raised.value)) < 1000

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from oxbow.errors import ErrorCode, ErrorReply, InvalidMission
+from oxbow.errors import ErrorCode, ErrorReply, InvalidRequest
 from oxbow.stage.answered import Answered, digest
 from oxbow.stage.wire import Done, Failed
 
@@ -42,5 +42,5 @@ def test_an_answer_that_is_kept_again_takes_its_room_once() -> None:
 def test_another_request_under_the_same_id_never_gets_its_answer() -> None:
     answered = Answered(most_bytes=10_000)
     answered.put("same", digest(REQUEST), done(1))
-    with pytest.raises(InvalidMission, match="request_id: is 'same', the id of another request"):
+    with pytest.raises(InvalidRequest, match="request_id: is 'same', the id of another request"):
         answered.get("same", b"another request")

@@ -23,7 +23,7 @@ from oxbow.contracts import (
     PathPlan,
     PathRequest,
 )
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.wire import codec
 from oxbow.wire.recording import Layer, discard
 from oxbow_decomposition.service import handle as decompose
@@ -87,15 +87,15 @@ def test_polygons_come_back_as_they_were(order: int, flavor: str) -> None:
     ],
 )
 def test_what_is_no_polygon_is_refused_before_geos_sees_it(outline: Any, message: str) -> None:
-    with pytest.raises(InvalidMission, match=rf"ContourRequest\.outline: .*({message})"):
+    with pytest.raises(InvalidRequest, match=rf"ContourRequest\.outline: .*({message})"):
         codec.decode(sent(outline=outline), ContourRequest)
 
 
 def test_the_field_is_named_with_its_index() -> None:
     zones = [shapely.to_wkb(SQUARE), collection(2)]
-    with pytest.raises(InvalidMission, match=r"ContourRequest\.zones\[1\]: is WKB of type 7"):
+    with pytest.raises(InvalidRequest, match=r"ContourRequest\.zones\[1\]: is WKB of type 7"):
         codec.decode(sent(zones=zones), ContourRequest)
-    with pytest.raises(InvalidMission, match=r"ContourRequest\.spacing_m: expected `float`, got `str`"):
+    with pytest.raises(InvalidRequest, match=r"ContourRequest\.spacing_m: expected `float`, got `str`"):
         codec.decode(sent(spacing_m="x"), ContourRequest)
 
 
@@ -105,7 +105,7 @@ def test_layers_may_hold_any_simple_geometry_and_no_collection() -> None:
     for there, back in zip(layer.geometries, codec.decode(codec.encode(layer), Layer).geometries, strict=True):
         assert shapely.equals_exact(there, back, tolerance=0.0)
     nested = {"stage": "s", "name": "n", "geometries": [collection(200_000)]}
-    with pytest.raises(InvalidMission, match=r"Layer\.geometries\[0\]: is WKB of type 7"):
+    with pytest.raises(InvalidRequest, match=r"Layer\.geometries\[0\]: is WKB of type 7"):
         codec.decode(msgspec.msgpack.encode(nested), Layer)
 
 
@@ -128,13 +128,13 @@ def test_layers_may_hold_any_simple_geometry_and_no_collection() -> None:
 )
 def test_what_is_no_array_of_floats_is_refused(floor: Any) -> None:
     message = {"floor": floor, "ceiling": ["<f8", [1, 2], bytes(16)], "start": 0, "end": 0}
-    with pytest.raises(InvalidMission, match=r"Cell\.floor: is not an array"):
+    with pytest.raises(InvalidRequest, match=r"Cell\.floor: is not an array"):
         codec.decode(msgspec.msgpack.encode(message), Cell)
 
 
 def test_elements_that_are_not_finite_are_refused() -> None:
     message = {"floor": ["<f8", [1, 2], np.array([math.inf, 0.0]).tobytes()], "ceiling": [], "start": 0, "end": 0}
-    with pytest.raises(InvalidMission, match=r"Cell\.floor: has elements that are not finite"):
+    with pytest.raises(InvalidRequest, match=r"Cell\.floor: has elements that are not finite"):
         codec.decode(msgspec.msgpack.encode(message), Cell)
 
 
@@ -153,19 +153,19 @@ def test_elements_that_are_not_finite_are_refused() -> None:
 )
 @pytest.mark.parametrize("kind", [ContourRequest, PathPlan, Lines])
 def test_bytes_that_are_no_message_are_refused(data: bytes, kind: type[Message]) -> None:
-    with pytest.raises(InvalidMission, match=kind.__name__):
+    with pytest.raises(InvalidRequest, match=kind.__name__):
         codec.decode(data, kind)
 
 
 def test_a_message_is_checked_where_it_is_made_too() -> None:
     bow_tie = Polygon([(0, 0), (1, 1), (1, 0), (0, 1)])
-    with pytest.raises(InvalidMission, match=r"zones\[0\]: is empty or not a valid polygon"):
+    with pytest.raises(InvalidRequest, match=r"zones\[0\]: is empty or not a valid polygon"):
         ContourRequest(outline=SQUARE, zones=(bow_tie,), spacing_m=1.0)
-    with pytest.raises(InvalidMission, match="outline: is a Point; expected a Polygon"):
+    with pytest.raises(InvalidRequest, match="outline: is a Point; expected a Polygon"):
         ContourRequest(outline=Point(0, 0), spacing_m=1.0)  # type: ignore[arg-type]
-    with pytest.raises(InvalidMission, match="outline: has coordinates that are not finite, or beyond"):
+    with pytest.raises(InvalidRequest, match="outline: has coordinates that are not finite, or beyond"):
         ContourRequest(outline=box(0, 0, 1e200, 1.0), spacing_m=1.0)
-    with pytest.raises(InvalidMission, match="path: is empty; expected a line"):
+    with pytest.raises(InvalidRequest, match="path: is empty; expected a line"):
         PathPlan(path=LineString(), spacing_m=1.0, steps=())
 
 
@@ -173,10 +173,10 @@ def test_cells_of_another_heading_are_refused() -> None:
     request = DecomposeRequest(free=box(0.0, 0.0, 30.0, 10.0), spacing_m=2.0, heading_rad=0.3)
     right = msgspec.msgpack.decode(codec.encode(decompose(request, discard)))
     for heading_rad in (0.31, 1e300):
-        with pytest.raises(InvalidMission, match=r"cells\[0\]: begins or ends .* m from its critical points"):
+        with pytest.raises(InvalidRequest, match=r"cells\[0\]: begins or ends .* m from its critical points"):
             codec.decode(msgspec.msgpack.encode(right | {"heading_rad": heading_rad}), Decomposition)
     cells = [right["cells"][0] | {"start": 9}, *right["cells"][1:]]
-    with pytest.raises(InvalidMission, match=r"cells\[0\]: joins the critical points 9 and"):
+    with pytest.raises(InvalidRequest, match=r"cells\[0\]: joins the critical points 9 and"):
         codec.decode(msgspec.msgpack.encode(right | {"cells": cells}), Decomposition)
 
 
@@ -185,7 +185,7 @@ def test_a_spacing_beyond_the_water_is_refused() -> None:
     cells = decompose(DecomposeRequest(free=free, spacing_m=2.0, heading_rad=0.0), discard)
     space = FreeSpace(free=free, water=free, tolerance_m=0.0, compression=1.0)
     with pytest.raises(
-        InvalidMission, match="min_spacing_m: is 51 m; expected at most the extent of the water, 50 m"
+        InvalidRequest, match="min_spacing_m: is 51 m; expected at most the extent of the water, 50 m"
     ):
         PathRequest(
             space=space,

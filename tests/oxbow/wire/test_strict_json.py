@@ -8,7 +8,7 @@ import random
 import msgspec
 import pytest
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.wire.strict_json import decode_json
 
 
@@ -48,7 +48,7 @@ DOCUMENT = {
     ],
 )
 def test_what_is_wrong_is_named(data: bytes, message: str) -> None:
-    with pytest.raises(InvalidMission, match=message):
+    with pytest.raises(InvalidRequest, match=message):
         decode_json(data, Whole, "document")
 
 
@@ -64,6 +64,6 @@ def test_a_changed_document_is_one_or_is_refused() -> None:
             )
         try:
             decode_json(bytes(data), Whole, "document")
-        except InvalidMission:
+        except InvalidRequest:
             refused += 1
     assert refused > 2_500

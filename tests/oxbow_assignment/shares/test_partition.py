@@ -12,7 +12,7 @@ from shapely import Polygon, affinity, box
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.contracts import ContourRequest
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.mission.file import read_mission
 from oxbow.site.site import Site
 from oxbow.testing import nasty_polygons
@@ -199,15 +199,15 @@ def test_the_same_mesh_gives_the_same_shares():
 @pytest.mark.parametrize(
     ("starts", "capacities", "message"),
     [
-        ([], None, "Vehicles: are 0"),
-        ([(0.0, 0.0)] * 2, [1.0], "Vehicles: are 2, with 1 capacities"),
-        ([(0.0, 0.0)] * 2, [1.0, 0.0], r"Vehicles\[1\]: has a capacity of 0.0"),
-        ([(0.0, 0.0)] * 2, [math.inf, 1.0], r"Vehicles\[0\]: has a capacity of inf"),
-        ([(0.0, 0.0)] * 10_000, None, "Vehicles: are 10000"),
+        ([], None, "starts: are 0"),
+        ([(0.0, 0.0)] * 2, [1.0], "starts: are 2, with 1 capacities"),
+        ([(0.0, 0.0)] * 2, [1.0, 0.0], r"capacities\[1\]: has a capacity of 0.0"),
+        ([(0.0, 0.0)] * 2, [math.inf, 1.0], r"capacities\[0\]: has a capacity of inf"),
+        ([(0.0, 0.0)] * 10_000, None, "starts: are 10000"),
     ],
 )
 def test_vehicles_that_cannot_share_are_named(starts, capacities, message):
     mesh = mesh_area(box(0, 0, 100, 100), 20.0)
     for share in (balanced_partition, wavefront_partition):
-        with pytest.raises(InvalidMission, match=message):
+        with pytest.raises(InvalidRequest, match=message):
             share(mesh, starts, None if capacities is None else np.array(capacities))

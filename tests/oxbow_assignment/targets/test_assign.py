@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from oxbow.contracts import Role, Vehicle
-from oxbow.errors import InvalidMission, Unavailable
+from oxbow.errors import InvalidRequest, Unavailable
 from oxbow_assignment.targets import joint
 from oxbow_assignment.targets.assign import Clustering, ClusterMethod, assign
 from oxbow_assignment.targets.assignment import assignment_of
@@ -222,7 +222,7 @@ def test_vehicles_without_a_route_between_them_each_serve_their_side():
 )
 def test_a_vehicle_that_cannot_be_is_named(fields, says):
     right = {"name": "boat", "length_m": 1.0, "start": (0.0, 0.0), "recovery": (0.0, 0.0)}
-    with pytest.raises(InvalidMission, match=says):
+    with pytest.raises(InvalidRequest, match=says):
         Vehicle(**(right | fields))
 
 
@@ -242,7 +242,7 @@ def test_a_vehicle_that_cannot_be_is_named(fields, says):
     ],
 )
 def test_bad_requests_are_named(ask, says):
-    with pytest.raises(InvalidMission, match=says):
+    with pytest.raises(InvalidRequest, match=says):
         ask()
 
 

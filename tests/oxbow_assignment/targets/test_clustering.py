@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist, pdist, squareform
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow_assignment.targets.clustering import (
     cluster_by_radius,
     fading_weights,
@@ -188,7 +188,7 @@ def test_a_target_that_has_faded_away_founds_no_cluster():
     ],
 )
 def test_bad_requests_are_named(ask, says):
-    with pytest.raises(InvalidMission, match=says):
+    with pytest.raises(InvalidRequest, match=says):
         ask(in_plane(plane(1, 5)))
 
 
@@ -204,5 +204,5 @@ def test_bad_requests_are_named(ask, says):
     ],
 )
 def test_bad_distances_are_named(distances, says):
-    with pytest.raises(InvalidMission, match=says):
+    with pytest.raises(InvalidRequest, match=says):
         pseudo_coordinates(distances)

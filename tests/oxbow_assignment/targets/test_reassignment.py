@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow_assignment.targets.assign import assign
 from oxbow_assignment.targets.problem import Objective, Problem
 from oxbow_assignment.targets.reassignment import reassign
@@ -108,5 +108,5 @@ def test_a_current_target_out_of_reach_is_given_up():
     ],
 )
 def test_tours_that_do_not_fit_are_named(tours, hysteresis_s, says):
-    with pytest.raises(InvalidMission, match=says):
+    with pytest.raises(InvalidRequest, match=says):
         reassign(random_problem(1, 2, 2), tours, hysteresis_s=hysteresis_s)

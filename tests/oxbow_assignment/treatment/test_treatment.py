@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon, affinity, box
 
 from oxbow.contracts import HotSpot
-from oxbow.errors import Infeasible, InvalidMission
+from oxbow.errors import Infeasible, InvalidRequest
 from oxbow.geometry.route import RouteMethod, make_router
 from oxbow.testing import nasty_polygons
 from oxbow_assignment.treatment import division
@@ -112,7 +112,7 @@ def test_the_way_over_a_hot_spot_is_little_longer_than_its_passes():
 
 def test_a_swath_far_too_small_is_refused():
     message = r"swath_m: is 0.001 m: hot spot 'bloom' would take 30000 passes; expected 0.03 m or more"
-    with pytest.raises(InvalidMission, match=message):
+    with pytest.raises(InvalidRequest, match=message):
         treatment(box(0, 0, 100, 30), SEA, 0.001)
     assert 0.03 * MOST_PASSES == 30.0
 

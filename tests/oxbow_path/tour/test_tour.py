@@ -346,5 +346,5 @@ def test_the_least_spacing_limits_the_number_of_sites():
 
 def test_recovery_beyond_reach_is_refused_with_the_length():
     strip = box(0, 0, 5000, 60)
-    with pytest.raises(Infeasible, match="Master_length"):
+    with pytest.raises(Infeasible, match="length_m"):
         planned(request(strip, spacings=2, launch=(0.0, 30.0), recovery=(5000.0, 30.0)))

@@ -20,7 +20,7 @@ REGION = box(100, 100, 900, 500)
 
 
 def leg(place):
-    return access(place, FREE, Routes(WATER, 50.0), where="LaunchPoint")
+    return access(place, FREE, Routes(WATER, 50.0), where="launch")
 
 
 def test_a_leg_from_the_shore_is_the_shortest():
@@ -33,7 +33,7 @@ def test_a_leg_from_the_shore_is_the_shortest():
 
 def test_a_leg_round_a_corner_stays_in_the_water():
     hook = shapely.union_all([box(0, 0, 1000, 600), box(1000, 0, 1200, 8), box(1192, 0, 1200, 300)])
-    way = access((1196.0, 290.0), FREE, Routes(hook, 50.0), where="LaunchPoint")
+    way = access((1196.0, 290.0), FREE, Routes(hook, 50.0), where="launch")
     assert hook.buffer(1e-9).covers(way.line)
     assert way.line.length < 1.1 * (290 + 200)
 
@@ -85,7 +85,7 @@ def test_a_ring_that_shows_only_one_side_of_a_corner_is_opened_beside_it():
 def test_legs_of_two_places_up_one_creek_run_beside_one_another():
     creek = WATER | box(-200, 300, 1, 306)
     places = [(-199.0, 303.0), (-100.0, 306.0), (-60.0, 300.0), (-80.0, 307.0), (-200.0, 305.0)]
-    legs = [access(place, FREE, Routes(creek, 50.0), where="LaunchPoint") for place in places]
+    legs = [access(place, FREE, Routes(creek, 50.0), where="launch") for place in places]
     region = REGION | box(10, 290, 100, 316)
     for launch, recovery in itertools.product(legs, repeat=2):
         path = path_with_legs(region, launch, recovery, Passable(FREE), opening_m=5.0, detail_m=50.0)
@@ -100,7 +100,7 @@ def test_legs_that_meet_at_a_slant_in_a_winding_creek_run_beside_one_another():
         7, cap_style="flat"
     )
     places = [(-160.0, 250.0), (-120.0, 285.0), (-95.0, 276.0), (-140.0, 266.0), (-62.0, 313.0)]
-    legs = [access(place, FREE, Routes(creek, 5.0), where="LaunchPoint") for place in places]
+    legs = [access(place, FREE, Routes(creek, 5.0), where="launch") for place in places]
     region = REGION | box(10, 280, 100, 330)
     for launch, recovery in itertools.permutations(legs, 2):
         path = path_with_legs(region, launch, recovery, Passable(FREE), opening_m=5.0, detail_m=50.0)

@@ -75,7 +75,7 @@ def test_launch_and_recovery_apart():
 
 
 def test_a_length_that_is_too_short_is_told():
-    with pytest.raises(Infeasible, match="Master_length"):
+    with pytest.raises(Infeasible, match="length_m"):
         planned(request(box(0, 0, 5000, 60), spacings=2, launch=(0.0, 30.0), recovery=(5000.0, 30.0)))
 
 

@@ -108,7 +108,7 @@ def leg_routes(free: BaseGeometry, water: Polygon) -> Routes:
     return Routes(water, max(DETAIL * clearance_m, water.length / MOST_GATES))
 
 
-def way_to(area: BaseGeometry, routes: Routes, place: Place) -> FloatArray:
+def way_to(area: BaseGeometry, routes: Routes, place: Place, *, where: str = "place") -> FloatArray:
     """The way from a place to where it first meets an area, shape (n, 2).
 
     A way from ashore leads straight to the nearest place of the water, and on as from there. In the water it leads
@@ -122,6 +122,8 @@ def way_to(area: BaseGeometry, routes: Routes, place: Place) -> FloatArray:
         Routes through the water.
     place
         The start, outside the area or in it.
+    where
+        What errors call the start.
 
     Returns
     -------
@@ -134,17 +136,17 @@ def way_to(area: BaseGeometry, routes: Routes, place: Place) -> FloatArray:
         No water leads from the place to the area.
     """
     landing = Landing.of(place, routes.water)
-    return landing.onward(_way_afloat(area, routes, landing.berth))
+    return landing.onward(_way_afloat(area, routes, landing.berth, where))
 
 
-def _way_afloat(area: BaseGeometry, routes: Routes, berth: Place) -> FloatArray:
+def _way_afloat(area: BaseGeometry, routes: Routes, berth: Place, where: str) -> FloatArray:
     point = Point(berth)
     straight = shapely.shortest_line(point, area)
     if straight.difference(routes.water).length <= ROUNDING_M:
         return np.asarray(shapely.get_coordinates(straight))
     route = routes.to_area(np.array(berth), area, routes.goals_in(area))
     if route is None:
-        raise Infeasible("lies in water from which no route leads to the free space", "LaunchPoint")
+        raise Infeasible("lies in water from which no route leads to the free space", where)
     # A route to a goal may cross the area before: only the stretch up to the first contact counts.
     outside = shapely.get_parts(route.difference(area))
     return np.asarray(shapely.get_coordinates(outside[np.argmin(shapely.distance(outside, point))]))

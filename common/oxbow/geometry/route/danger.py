@@ -30,7 +30,7 @@ from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import FloatArray, Mask
 from oxbow.contracts import DangerZone, Per
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 
 __all__ = ["NO_DANGER", "Danger"]
 
@@ -53,7 +53,7 @@ class Danger:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         A parameter is out of range.
     """
 
@@ -63,9 +63,9 @@ class Danger:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.c_max_m < math.inf:
-            raise InvalidMission(f"is {self.c_max_m!r}; expected a finite number, >= 0", where="c_max_m")
+            raise InvalidRequest(f"is {self.c_max_m!r}; expected a finite number, >= 0", where="c_max_m")
         if not 1.0 <= self.a < math.inf:
-            raise InvalidMission(f"is {self.a!r}; expected a finite number, >= 1", where="a")
+            raise InvalidRequest(f"is {self.a!r}; expected a finite number, >= 1", where="a")
 
     def costs(self, starts: FloatArray, ends: FloatArray) -> FloatArray:
         """Costs of straight edges.

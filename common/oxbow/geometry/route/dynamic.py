@@ -18,7 +18,7 @@ import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 
 from oxbow.arrays import FloatArray, Geometries, Mask
-from oxbow.errors import Infeasible, InvalidMission
+from oxbow.errors import Infeasible, InvalidRequest
 from oxbow.geometry.route.danger import NO_DANGER, Danger
 from oxbow.geometry.route.mesh import WaterMesh
 from oxbow.geometry.route.methods import router_on
@@ -46,7 +46,7 @@ class DynamicRouter:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         The water is empty or not a valid polygon.
     """
 
@@ -81,13 +81,13 @@ class DynamicRouter:
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             The area is empty or not a valid polygon; names the obstacle.
         Infeasible
             It would cover all the water that is left; the obstacles stay as they are.
         """
         if area.is_empty or not shapely.is_valid(area):
-            raise InvalidMission("is empty or not a valid polygon", where=name)
+            raise InvalidRequest("is empty or not a valid polygon", where=name)
         self._change(name, shapely.set_precision(area, GRID_M))
 
     def remove(self, name: str) -> None:
@@ -95,12 +95,12 @@ class DynamicRouter:
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             There is no obstacle of that name.
         """
         if name not in self._obstacles:
             known = ", ".join(sorted(self._obstacles)) or "none, for there is no obstacle"
-            raise InvalidMission(f"is not an obstacle; expected one of: {known}", where=name)
+            raise InvalidRequest(f"is not an obstacle; expected one of: {known}", where=name)
         self._change(name, Polygon())
 
     def route(self, start: npt.ArrayLike, goal: npt.ArrayLike) -> Route:

@@ -15,7 +15,7 @@ from shapely import LineString, MultiPolygon, Point, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import FloatArray, Geometries, Indices, Mask
-from oxbow.errors import Infeasible, InvalidMission
+from oxbow.errors import Infeasible, InvalidRequest
 from oxbow.geometry.triangles import angles_rad, following, triangulated, twins_of
 from oxbow.tolerances import ROUNDING_M
 
@@ -102,11 +102,11 @@ class WaterMesh:
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             The water is empty or not a valid polygon.
         """
         if water.is_empty or not shapely.is_valid(water):
-            raise InvalidMission("is empty or not a valid polygon", where="water")
+            raise InvalidRequest("is empty or not a valid polygon", where="water")
         # Parted only where there are outlines: noding moves vertices by rounding, and takes time.
         faces = _parted(water, outlines) if outlines else water
         points, triangles = triangulated(faces if math.isinf(detail_m) else shapely.segmentize(faces, detail_m))
@@ -223,13 +223,13 @@ class WaterMesh:
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             A place is not finite.
         Infeasible
             A place lies outside the water.
         """
         for number in np.flatnonzero(~np.isfinite(places).all(axis=1)).tolist():
-            raise InvalidMission(f"is {_text(places[number])}; expected finite metres", where=names[number])
+            raise InvalidRequest(f"is {_text(places[number])}; expected finite metres", where=names[number])
         touches = self.holding(places)
         for number in sorted(set(range(len(places))) - set(touches.place.tolist())):
             nearest, distance_m = self._index.query_nearest(Point(places[number]), return_distance=True)

@@ -36,7 +36,7 @@ def make_router(method: RouteMethod, water: Polygon | MultiPolygon, danger: Dang
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         The water is empty or not a valid polygon.
     """
     return router_on(WaterMesh.of(water, danger.outlines), method, danger)

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from oxbow.arrays import FloatArray, Indices
-from oxbow.errors import Infeasible, InvalidMission
+from oxbow.errors import Infeasible, InvalidRequest
 from oxbow.geometry.route.danger import Danger
 from oxbow.geometry.route.mesh import Touches, WaterMesh
 from oxbow.geometry.route.route import Route, RouteMethod, RouteTable, measured_route
@@ -128,7 +128,7 @@ class NetworkRouter:
 
         Raises
         ------
-        InvalidMission
+        InvalidRequest
             One of them is not one place, or is not finite.
         Infeasible
             Start or goal lies outside the water (`where` says which), or no water leads from one to the other.
@@ -251,12 +251,12 @@ def _checked_places(places: npt.ArrayLike) -> FloatArray:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         They have another shape.
     """
     array = np.asarray(places, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != 2:
-        raise InvalidMission(f"have shape {array.shape}; expected places of shape (n, 2)", where="points")
+        raise InvalidRequest(f"have shape {array.shape}; expected places of shape (n, 2)", where="points")
     return array
 
 
@@ -265,13 +265,13 @@ def _checked_ends(start: npt.ArrayLike, goal: npt.ArrayLike) -> FloatArray:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         One of them is not one place.
     """
     ends = [np.asarray(place, dtype=np.float64) for place in (start, goal)]
     for place, name in zip(ends, ("start", "goal"), strict=True):
         if place.shape != (2,):
-            raise InvalidMission(f"has shape {place.shape}; expected one place (x, y)", where=name)
+            raise InvalidRequest(f"has shape {place.shape}; expected one place (x, y)", where=name)
     return np.stack(ends)
 
 

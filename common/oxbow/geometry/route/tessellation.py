@@ -20,7 +20,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from oxbow.arrays import FloatArray, Indices
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.geometry.lattice import joined_lattice
 from oxbow.geometry.route.danger import NO_DANGER, Danger
 from oxbow.geometry.route.mesh import Touches, WaterMesh
@@ -59,7 +59,7 @@ class Tessellation:
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         `side_m` is not a length, or less than a thousandth of the longer side of the water's box.
     """
 
@@ -67,7 +67,7 @@ class Tessellation:
         across_m = float(np.ptp(mesh.points, axis=0).max())
         least_m = across_m / MOST_SIDES_ACROSS
         if side_m is not None and not least_m <= side_m < math.inf:
-            raise InvalidMission(f"is {side_m!r}; expected a finite number >= {least_m:.3g}", where="side_m")
+            raise InvalidRequest(f"is {side_m!r}; expected a finite number >= {least_m:.3g}", where="side_m")
         self.mesh = mesh
         self.danger = danger
         self.side_m = across_m / SIDES_ACROSS if side_m is None else side_m

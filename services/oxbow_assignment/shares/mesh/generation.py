@@ -9,7 +9,7 @@ import shapely
 from shapely import Polygon
 
 from oxbow.arrays import FloatArray
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.geometry.lattice import triangular_lattice
 from oxbow_assignment.shares.mesh.mesh import Mesh
 from oxbow_assignment.shares.mesh.refinement import refined
@@ -61,7 +61,7 @@ def mesh_area(
 
     Raises
     ------
-    InvalidMission
+    InvalidRequest
         The area is empty or invalid, the edge or the angle is out of bounds, or the mesh would be far too large.
     """
     _require_fit(area, edge_m, least_angle_deg)
@@ -79,16 +79,16 @@ def mesh_area(
 
 def _require_fit(area: Polygon, edge_m: float, least_angle_deg: float) -> None:
     if area.is_empty or not shapely.is_valid(area) or area.area == 0.0:
-        raise InvalidMission("is empty or not a valid polygon; expected one with an area", where="area")
+        raise InvalidRequest("is empty or not a valid polygon; expected one with an area", where="area")
     if not 0.0 < edge_m < math.inf:
-        raise InvalidMission(f"is {edge_m!r}; expected a finite number > 0.0", where="edge_m")
+        raise InvalidRequest(f"is {edge_m!r}; expected a finite number > 0.0", where="edge_m")
     if not 0.0 <= least_angle_deg <= GREATEST_BOUND_DEG:
-        raise InvalidMission(
+        raise InvalidRequest(
             f"is {least_angle_deg!r}; expected 0 to {GREATEST_BOUND_DEG:g} degrees", where="least_angle_deg"
         )
     expected = 4 / math.sqrt(3) * area.area / (PITCH * edge_m) ** 2
     if expected > MAX_TRIANGLES:
-        raise InvalidMission(
+        raise InvalidRequest(
             f"is {edge_m!r}, which makes about {expected:.0f} triangles; expected one that makes at most"
             f" {MAX_TRIANGLES}",
             where="edge_m",

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from shapely import Polygon, box
 
 from oxbow.contracts import DangerZone, Per
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.geometry.route import Danger, RouteMethod, make_router
 from tests.support.route_scenes import places_in, scene, scene_router
 
@@ -184,11 +184,11 @@ def worth_m(length_m, danger, factor):
 
 def test_a_danger_of_1_is_refused_by_name():
     for probability in (1.0, 1.5, -0.1, math.nan):
-        with pytest.raises(InvalidMission, match=r"shallows: has danger .*expected 0 <= danger < 1"):
+        with pytest.raises(InvalidRequest, match=r"shallows: has danger .*expected 0 <= danger < 1"):
             per_metre(probability)
-    with pytest.raises(InvalidMission, match="lane: is empty"):
+    with pytest.raises(InvalidRequest, match="lane: is empty"):
         per_crossing(0.5, Polygon())
-    with pytest.raises(InvalidMission, match=r"a: is 0\.9; expected a finite number, >= 1"):
+    with pytest.raises(InvalidRequest, match=r"a: is 0\.9; expected a finite number, >= 1"):
         Danger(a=0.9)
-    with pytest.raises(InvalidMission, match="c_max_m: is inf"):
+    with pytest.raises(InvalidRequest, match="c_max_m: is inf"):
         Danger(c_max_m=math.inf)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from shapely import Polygon, box
 
 from oxbow.contracts import DangerZone, Per
-from oxbow.errors import Infeasible, InvalidMission
+from oxbow.errors import Infeasible, InvalidRequest
 from oxbow.geometry.route import Danger, DynamicRouter, RouteMethod, make_router
 from oxbow.geometry.triangles import cross
 from oxbow.testing import nasty_polygons
@@ -121,9 +121,9 @@ def test_bad_obstacles_are_named_and_change_nothing():
     router = DynamicRouter(box(0, 0, 100, 100))
     router.put("wreck", box(40, 40, 60, 60))
     mesh = router.mesh
-    with pytest.raises(InvalidMission, match="crossed: is empty or not a valid polygon"):
+    with pytest.raises(InvalidRequest, match="crossed: is empty or not a valid polygon"):
         router.put("crossed", Polygon([(0, 0), (1, 1), (1, 0), (0, 1)]))
-    with pytest.raises(InvalidMission, match="whale: is not an obstacle; expected one of: wreck"):
+    with pytest.raises(InvalidRequest, match="whale: is not an obstacle; expected one of: wreck"):
         router.remove("whale")
     with pytest.raises(Infeasible, match="flood: covers all the water"):
         router.put("flood", box(-1, -1, 101, 101))

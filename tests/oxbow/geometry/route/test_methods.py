@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.sparse.csgraph import dijkstra
 from shapely import LineString, MultiPolygon, Point, Polygon, affinity, box
 
-from oxbow.errors import Infeasible, InvalidMission
+from oxbow.errors import Infeasible, InvalidRequest
 from oxbow.geometry.lattice import RINGS, joined_lattice
 from oxbow.geometry.route import RouteMethod, make_router, visibility
 from oxbow.geometry.route.channel import Channel
@@ -207,7 +207,7 @@ def test_reduced_ways_over_the_lattice_are_nearly_exact(seed):
 def test_a_lattice_needs_a_side():
     mesh = WaterMesh.of(box(0, 0, 100, 100))
     for side_m in (0.0, -1.0, np.nan, np.inf, 0.01):
-        with pytest.raises(InvalidMission, match=r"side_m: is .*expected a finite number >= 0\.1"):
+        with pytest.raises(InvalidRequest, match=r"side_m: is .*expected a finite number >= 0\.1"):
             Tessellation(mesh, side_m=side_m)
 
 
@@ -248,11 +248,11 @@ def test_places_out_of_the_water_are_named(method):
         router.route((-3, 10), (50, 10))
     with pytest.raises(Infeasible, match=r"points\[1\]"):
         router.distances([(10, 10), (50, 50)])
-    with pytest.raises(InvalidMission, match=r"points\[2\]: is \(nan, 0\)"):
+    with pytest.raises(InvalidRequest, match=r"points\[2\]: is \(nan, 0\)"):
         router.distances([(10, 10), (20, 20), (np.nan, 0)])
-    with pytest.raises(InvalidMission, match=r"start: has shape \(3,\)"):
+    with pytest.raises(InvalidRequest, match=r"start: has shape \(3,\)"):
         router.route((1, 2, 3), (1, 2))
-    with pytest.raises(InvalidMission, match="expected places of shape"):
+    with pytest.raises(InvalidRequest, match="expected places of shape"):
         router.distances([1, 2, 3])
 
 
@@ -287,5 +287,5 @@ def test_a_place_is_no_way_from_itself(method):
 
 def test_water_must_be_a_polygon():
     for water in (Polygon(), Polygon([(0, 0), (1, 1), (1, 0), (0, 1)])):
-        with pytest.raises(InvalidMission, match="water: is empty or not a valid polygon"):
+        with pytest.raises(InvalidRequest, match="water: is empty or not a valid polygon"):
             make_router(RouteMethod.VISIBILITY, water)

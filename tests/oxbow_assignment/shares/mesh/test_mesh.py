@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Polygon, affinity, box
 
-from oxbow.errors import InvalidMission
+from oxbow.errors import InvalidRequest
 from oxbow.testing import nasty_polygons
 from oxbow_assignment.shares.mesh import Mesh, mesh_area, propagate
 from oxbow_assignment.shares.mesh.refinement import refined
@@ -167,7 +167,7 @@ def test_places_are_located_in_their_triangles():
     ],
 )
 def test_what_no_mesh_can_be_made_of_is_named(area, edge_m, bound, message):
-    with pytest.raises(InvalidMission, match=message):
+    with pytest.raises(InvalidRequest, match=message):
         mesh_area(area, edge_m, least_angle_deg=bound)
 
 

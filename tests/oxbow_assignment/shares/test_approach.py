@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon, box
 
-from oxbow.contracts import FreeSpace, Role, Vehicle
+from oxbow.contracts import Approach, Role, Share, Vehicle
 from oxbow.errors import Infeasible
-from oxbow.planning.approach import Approach, Harbour
+from oxbow_assignment.shares.approach import Harbour
+from oxbow_path.approach import joined
 
 LAKE = box(0, 0, 1000, 400) - box(300, 100, 500, 400)
 FREE = LAKE.buffer(-5.0, join_style="mitre")
-SPACE = FreeSpace(free=FREE, water=LAKE, tolerance_m=1.0, compression=1.0)
 EAST = FREE & box(600, 0, 1000, 400)
 SPACING_M = 20.0
 
@@ -39,9 +39,13 @@ def ring(share: Polygon, gate) -> LineString:
     return line
 
 
-def with_legs(approach: Approach, start, recovery) -> LineString:
+def share_of(start, recovery=None, *, spacing_m=SPACING_M, length_m=1e5) -> Share:
+    return Harbour(FREE, LAKE, spacing_m).share(EAST, vehicle(start, recovery, length_m))
+
+
+def whole(approach: Approach, start, recovery) -> LineString:
     assert approach.launch == approach.recovery
-    path = approach.with_legs(ring(EAST, approach.launch))
+    path = joined(ring(EAST, approach.launch), approach)
     assert path.is_simple
     assert (path.coords[0], path.coords[-1]) == (start, recovery)
     return path
@@ -50,10 +54,11 @@ def with_legs(approach: Approach, start, recovery) -> LineString:
 @given(start=ashore | afloat)
 @quick
 def test_out_and_home_from_one_place(start):
-    approach = Harbour(SPACE, SPACING_M).approach(EAST, vehicle(start))
+    share = share_of(start)
+    approach = share.approach
     assert EAST.covers(Point(approach.launch))
-    assert approach.space.free.area == pytest.approx(EAST.area)
-    path = with_legs(approach, start, start)
+    assert share.area.area == pytest.approx(EAST.area)
+    path = whole(approach, start, start)
     entry = FREE.distance(Point(start))
     # Straight out, whatever the distance of the two ways: no leg runs along the shore.
     stray = path - FREE.buffer(0.01) - Point(start).buffer(1.2 * entry + 0.01)
@@ -63,63 +68,49 @@ def test_out_and_home_from_one_place(start):
 @given(start=afloat, recovery=ashore | afloat)
 @quick
 def test_out_from_one_place_and_home_to_another(start, recovery):
-    with_legs(Harbour(SPACE, SPACING_M).approach(EAST, vehicle(start, recovery)), start, recovery)
+    whole(share_of(start, recovery).approach, start, recovery)
 
 
 @given(start=afloat, spacing_m=st.sampled_from([20.0, 150.0]))
 @quick
 def test_what_legs_take_is_their_length(start, spacing_m):
-    approach = Harbour(SPACE, spacing_m).approach(EAST, vehicle(start))
+    approach = share_of(start, spacing_m=spacing_m).approach
     around = ring(EAST, approach.launch)
-    kept_m = 1e5 - approach.length_m(1e5)
-    taken_m = approach.with_legs(around).length - around.length
+    taken_m = joined(around, approach).length - around.length
     # What is kept back and not used, the vehicle does not survey with.
-    assert taken_m <= kept_m <= taken_m + 0.5 * spacing_m
+    assert taken_m <= approach.legs_m <= taken_m + 0.5 * spacing_m
 
 
 @given(x=st.floats(530, 595), y=st.floats(-10, 20), spacing_m=st.floats(20, 400))
 @quick
 def test_a_leg_from_beside_a_share_does_not_begin_in_it(x, y, spacing_m):
     before = FREE & box(520, 0, 600, 40)
-    approach = Harbour(SPACE, spacing_m).approach(FREE - before - box(0, 0, 520, 400), vehicle((x, y)))
-    assert approach.out is not None
-    assert (LineString(approach.out.points) & approach.space.free).length < 0.01
+    share = Harbour(FREE, LAKE, spacing_m).share(FREE - before - box(0, 0, 520, 400), vehicle((x, y)))
+    assert share.approach.out is not None
+    assert (share.approach.out.line & share.area).length < 0.01
 
 
 def test_a_vehicle_at_its_share_has_no_legs():
     for start in ((700.0, 200.0), (1010.0, 200.0), (990.0, 399.0)):
-        approach = Harbour(SPACE, SPACING_M).approach(EAST, vehicle(start))
-        assert approach.out is None
-        assert approach.home is None
-        assert approach.space.water.equals(LAKE)
-        assert approach.length_m(5.0) == 5.0
-        path = LineString([start, (800, 200), start])
-        assert approach.with_legs(path) is path
+        share = share_of(start, length_m=5.0)
+        assert not share.approach.has_legs
+        assert share.approach.legs_m == 0.0
+        assert share.area == EAST
 
 
 def test_a_way_that_is_longer_than_the_range_is_refused_with_its_length():
-    approach = Harbour(SPACE, SPACING_M).approach(EAST, vehicle((100.0, 100.0)))
-    with pytest.raises(Infeasible, match=r"Master_length: is 900 m; expected more than 1\d\d\d.* m: the way"):
-        approach.length_m(900.0)
-
-
-def test_a_way_that_takes_much_of_the_range_is_told():
-    approach = Harbour(SPACE, SPACING_M).approach(EAST, vehicle((50.0, 200.0)))
-    legs_m = 1e5 - approach.length_m(1e5)
-    assert not approach.warnings(5.0 * legs_m)
-    (told,) = approach.warnings(2.0 * legs_m)
-    assert "takes 50% of its" in told
+    with pytest.raises(Infeasible, match=r"'v': length_m: is 900 m; expected more than 1\d\d\d.* m: the way"):
+        share_of((100.0, 100.0), length_m=900.0)
 
 
 def test_lanes_are_as_narrow_as_the_water():
     strait = LAKE - box(300, 4.0, 500, 200)
     free = strait.buffer(-1.0, join_style="mitre")
-    space = FreeSpace(free=free, water=strait, tolerance_m=1.0, compression=1.0)
-    share = free & box(600, 0, 1000, 400)
-    assert isinstance(share, Polygon)
-    approach = Harbour(space, SPACING_M).approach(share, vehicle((100.0, 100.0)))
+    east = free & box(600, 0, 1000, 400)
+    assert isinstance(east, Polygon)
+    approach = Harbour(free, strait, SPACING_M).share(east, vehicle((100.0, 100.0))).approach
     assert 4.0 * approach.apart_m <= 2.0
-    path = approach.with_legs(ring(share, approach.launch))
+    path = joined(ring(east, approach.launch), approach)
     assert path.is_simple
     assert (path - free.buffer(0.01)).is_empty
 
@@ -133,20 +124,16 @@ def test_once_in_free_space_legs_keep_to_it(start):
     """The shortest water cuts the corner."""
     water = LAKE | CREEK
     free = water.buffer(-5.0, join_style="mitre")
-    space = FreeSpace(free=free, water=water, tolerance_m=1.0, compression=1.0)
-    share = free & box(600, 0, 1000, 400)
-    path = with_legs(Harbour(space, SPACING_M).approach(share, vehicle(start)), start, start)
+    east = free & box(600, 0, 1000, 400)
+    path = whole(Harbour(free, water, SPACING_M).share(east, vehicle(start)).approach, start, start)
     assert free.covers(Point(start))
     assert (path - free.buffer(0.01)).is_empty
 
 
-def test_water_without_a_way_to_the_share_is_refused():
+@pytest.mark.parametrize("field", ["start", "recovery"])
+def test_water_without_a_way_to_the_share_is_refused_by_the_place_it_is_missing_from(field):
     apart = box(0, 0, 100, 100)
-    space = FreeSpace(
-        free=shapely.union_all([apart, box(100, 40, 200, 40.0001), box(200, 0, 300, 100)]),
-        water=LAKE,
-        tolerance_m=1.0,
-        compression=1.0,
-    )
-    with pytest.raises(Infeasible, match="no route"):
-        Harbour(space, SPACING_M).approach(box(200, 0, 300, 100), vehicle((50.0, 50.0)))
+    free = shapely.union_all([apart, box(100, 40, 200, 40.0001), box(200, 0, 300, 100)])
+    places = {"start": (250.0, 50.0), "recovery": (250.0, 50.0), field: (50.0, 50.0)}
+    with pytest.raises(Infeasible, match=f"'v': {field}: .*no route"):
+        Harbour(free, LAKE, SPACING_M).share(box(200, 0, 300, 100), vehicle(**places))
