@@ -93,8 +93,8 @@ def test_no_time_without_end_or_beginning(oxbow, option, seconds):
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        (["-o", "prior.json", "--prior", "prior.json"], "prior.json: is 'prior.json', too"),
-        (["--prior", "link.json", "-o", "prior.json"], "prior.json: is 'link.json', too"),
+        (["-o", "prior.json", "--prior", "prior.json"], "prior.json: is also 'prior.json'"),
+        (["--prior", "link.json", "-o", "prior.json"], "prior.json: is also 'link.json'"),
         (["-o", "fifo"], "fifo: cannot be written: is not a regular file"),
         (["-o", "kept.json"], "kept.json: cannot be written: is write-protected"),
         (["-o", "circle.json"], "circle.json: cannot be written: its symbolic links form a loop"),
@@ -119,4 +119,4 @@ def test_a_recording_takes_the_place_of_no_other_file(oxbow, folder):
     (folder / "pond.rrd").write_bytes((folder / "pond.json").read_bytes())
     result = oxbow("plan", "pond.rrd", "--record", "pond.rrd", "--method", "None")
     assert result.returncode == 2
-    assert result.stderr.startswith("error: pond.rrd: is 'pond.rrd', too")
+    assert result.stderr.startswith("error: pond.rrd: is also 'pond.rrd'")

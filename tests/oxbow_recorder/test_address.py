@@ -45,7 +45,7 @@ def test_an_id_that_is_none_is_refused(field, text):
     "key", [layer_key("other", "path", "path"), layer_key("m", "other", "path"), layer_key("m", "path", "other")]
 )
 def test_key_and_message_have_to_agree(key):
-    with pytest.raises(InvalidRequest, match="another key"):
+    with pytest.raises(InvalidRequest, match="key other than its own"):
         address_of(key, layer_bytes())
 
 
