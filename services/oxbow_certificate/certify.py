@@ -67,6 +67,7 @@ def judge(request: CertifyRequest) -> Judgement:
     Infeasible
         The zones or the safety distance leave no water to judge on.
     """
+    # 1. How far the water is from all paths together, and how far it would be at best.
     space = JudgedSpace.of(request)
     lines = [track.path for track in request.tracks]
     paths = lines[0] if len(lines) == 1 else MultiLineString(lines)
@@ -76,11 +77,13 @@ def judge(request: CertifyRequest) -> Judgement:
     least_m = least_radius(space.judged.area, paths.length, len(lines))
     # The true water, not the judged one: rules are about the shore as the mission has it, to a centimetre.
     shore = Shore(space.water, request.safety_m, request.least_width_m)
+    # 2. How each path by itself keeps the rules, and what threatens it.
     danger = Danger(request.danger_zones)
     conducts = [shore.conduct(track.path, track.launch, track.recovery) for track in request.tracks]
     tracks = tuple(
         _conformance(track, conduct, danger) for track, conduct in zip(request.tracks, conducts, strict=True)
     )
+    # 3. All of it in one message, the caller's request identified.
     certificate = Certificate(
         **_together(tracks),
         **_water(space),
@@ -161,6 +164,7 @@ def _coverage(cover: CoverRadius, spread: DistanceSpread, least_m: float) -> dic
 def _evenness(request: CertifyRequest, paths: Paths, space: JudgedSpace, least_m: float) -> dict[str, Any]:
     """How evenly the paths sample places and directions; distances of legs are taken within each path."""
     spacing_m = 2.0 * least_m
+    # Near launch and recovery legs run side by side on purpose: distances there say nothing about the survey.
     margin_m = max(2.0 * request.safety_m, spacing_m)
     apart_m = [
         least_leg_distance(track.path, spacing_m, about_ends(space.free, (track.launch, track.recovery), margin_m))

@@ -109,6 +109,7 @@ def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     Infeasible
         The zones or the safety distance leave no water to judge on.
     """
+    # Before the judgement, which takes seconds on a large lake.
     sheet.checked_format(path, width_px)
     site = Site.of(mission)
     request = certify_request(mission, site)
@@ -117,6 +118,8 @@ def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
     unit = Unit.of(mission, judgement, treats=bool(request.areas))
     figures = _treated_figures(judgement, unit) if request.areas else _figures(judgement)
     with sheet.lettering():
+        # In the order in which things lie on top of one another; the magnified part avoids labels drawn before
+        # it.
         figure, axes = sheet.new_sheet(site)
         sheet.draw_site(axes, site, mission.safety_m)
         _draw_gaps(axes, judgement, unit)
@@ -154,6 +157,7 @@ def _draw_magnified(
     side_m = _MAGNIFIED_IN * (axes.get_xlim()[1] - axes.get_xlim()[0]) / figure.get_figwidth()
     times = side_m / (2 * shown_m)
     frame = _free_square(axes, site, judgement.cover.place, side_m)
+    # Less than twice as large would show nothing that the map itself does not.
     if frame is None or times < 2.0:
         return
     corner = figure.transFigure.inverted().transform(axes.transData.transform(frame.bounds[:2]))
@@ -170,6 +174,7 @@ def _free_square(axes: Axes, site: Site, place: Place, side_m: float) -> Polygon
     """The square of a side nearest to a place, of those that meet neither the water, a label nor the map's rim."""
     (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
     rim_m = 0.015 * (east - west)
+    # A coarse grid of corners is enough: the picture need not be as near to its place as it could be.
     corners_x = np.linspace(west + rim_m, east - 4 * rim_m - side_m, 24)
     corners_y = np.linspace(south + rim_m, north - rim_m - side_m, 24)
     x, y = (axis.ravel() for axis in np.meshgrid(corners_x, corners_y))

@@ -105,7 +105,7 @@ def plan_on(job: PlanningJob, endpoint: str) -> PlannedMission:
 
     Returns
     -------
-    Planned
+    PlannedMission
         Without a recording: that is with the stack, perhaps on another machine.
 
     Raises
@@ -124,6 +124,7 @@ def plan_on(job: PlanningJob, endpoint: str) -> PlannedMission:
             on_status=note,
             **msgspec.structs.asdict(job.options),
         )
+    # Kept before the stack stops: what fails from here on must not cost the plan.
     job.keep(planned)
     return PlannedMission(planned)
 
@@ -142,7 +143,7 @@ def plan_embedded(job: PlanningJob, recording: Path | None, recordings: Path) ->
 
     Returns
     -------
-    Planned
+    PlannedMission
         With its recording, where that could be kept.
 
     Raises

@@ -140,6 +140,7 @@ def _surveys(plan: PlanRecord) -> bool:
 def _survey_rows(plan: PlanRecord) -> Rows:
     yield "method", f"{plan.method}, seed {plan.seed}"
     if plan.method is Method.TRANSECT:
+        # Directions of transects are lines, not arrows: a heading and its opposite are one.
         several = "each share its own"
         yield "heading", several if plan.heading_deg is None else f"{plan.heading_deg % 180:.1f} deg"
     yield "spacing", f"{plan.spacing_m:.1f} m"
@@ -202,6 +203,7 @@ def print_evaluation(site: str, found: Evaluation) -> None:
     rows = ((name, _figure(value)) for name, value in msgspec.structs.asdict(found).items())
     console = _console()
     console.print(_table(f"Evaluation of {site}", rows))
+    # A single path has its measures in the table above already.
     for vehicle in found.vehicles if len(found.vehicles) > 1 else ():
         rows = ((name, _figure(value)) for name, value in msgspec.structs.asdict(vehicle).items())
         console.print(_table(f"Path of {vehicle.name}", rows))
@@ -268,6 +270,7 @@ def print_status(found: StackStatus) -> None:
         processes.add_row(service, "none")
     troubled = _grid("Started again", left=("process", "trouble now"), right=("starts", "pid"))
     for each in found.supervised:
+        # Every process has been started once; more than that is worth a row.
         if each.trouble or each.starts > 1:
             troubled.add_row(each.name, each.trouble, str(each.starts), str(each.pid))
     missions = _grid("Missions", left=("mission", "state", "at work", "error"), right=("revision", "done"))
@@ -288,6 +291,7 @@ def _process_cells(process: Process) -> tuple[str, ...]:
     if ping is None or stats is None:
         return ("silent",)
     counts = map(str, (stats.served, stats.failed, stats.queued))
+    # A process that has served nothing yet has no mean: a dash, not 0 s.
     seconds = (f"{stats.mean_s:.2f} s", f"{stats.p95_s:.2f} s") if stats.served else ("-", "-")
     memory = f"{(stats.session_rss_bytes + stats.worker_rss_bytes) / 2**20:.0f}"
     return (f"{ping.uptime_s:.0f} s", *counts, *seconds, memory)

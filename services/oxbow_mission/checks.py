@@ -155,6 +155,7 @@ class _Lane:
                 continue
             if isinstance(outcome, Checked):
                 return outcome
+            # A refusal: the check did its work, and found something wrong.
             if isinstance(outcome, HelperFailed):
                 raise outcome.error.error()
             break

@@ -71,6 +71,7 @@ class Database(Closing):
         with contextlib.ExitStack() as stack:
             try:
                 home.mkdir(parents=True, exist_ok=True)
+                # Appended to, not truncated: until it is held, the process id in it is another's.
                 self._lock = stack.enter_context((home / "missions.lock").open("a+"))
                 self._hold()
                 self._require_there()
@@ -80,6 +81,7 @@ class Database(Closing):
                 self._set_up(schema)
                 # Not before: a process id in the lock file means that there is a store, which must not vanish.
                 self._mark_held()
+                # Remember the files as they are now: later looks compare with this.
                 self._changed_by_others()
             except (OSError, sqlite3.Error) as error:
                 raise Unavailable(f"cannot keep missions: {error}", where=str(home)) from error

@@ -67,6 +67,7 @@ class Order:
             How long it was served; 0 at the beginning.
         """
         use, now_s = self._uses.pop(client, _Use()), time.monotonic()
+        # Popped and put back at the end: the first in the dictionary is then the one noted longest ago.
         self._uses[client] = _Use(next(self._turns), use.recent_s(now_s) + seconds, now_s)
         if len(self._uses) > MOST_KNOWN:  # who is forgotten is served as someone new
             self._uses.pop(next(iter(self._uses)))
@@ -126,6 +127,7 @@ class FairQueue(Generic[T]):
 
     def _require_room(self, row: _Row[T], size: int) -> None:
         every = sum(each.size for each in self._rows.values())
+        # An item larger than all the room there is would never be taken: it is, once nothing else waits.
         is_room = not every or every + size <= self.most_bytes
         is_own_room = not row.size or row.size + size <= self.most_bytes // 2
         if len(row.items) >= self.most_items or not (is_room and is_own_room):
@@ -217,6 +219,7 @@ class Turns:
                         self._busy[what] += 1
                         order.note(client)  # at once, so that its next request comes after the others'
                         return True
+                    # Not notified when `is_over` changes or when replicas come and go: hence a look now and then.
                     self._changed.wait(LOOK_S)
             finally:
                 waiting.remove(client)

@@ -112,6 +112,7 @@ class Helper(Closing):
         HelperDied
             The process ended, or said something that makes no sense.
         """
+        # Both limits count apart: a process that takes long to load must not cost the order its time.
         self.start()
         if not self._is_up:
             with self._limited(START_S):
@@ -142,6 +143,7 @@ class Helper(Closing):
     def _converse(self, order: Check | Plan, answer: Callable[[Ask | Show], Answer | None]) -> Outcome:
         self._order += 1
         self._tell(order)
+        # It may ask or show any number of times before it is done.
         while isinstance(said := self._heard(), Ask | Show):
             reply = answer(said)
             if reply is not None:
@@ -260,6 +262,7 @@ class Helpers(Closing):
         finally:
             with self._lock:
                 self._idle.append(helper)
+                # Closed meanwhile: whoever closed could not end a process that was at work.
                 if self._closed:
                     helper.close()
 

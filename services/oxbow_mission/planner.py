@@ -149,6 +149,7 @@ class _Run:
             parameters=self.job.request.parameters,
             show=self.shown,
         )
+        # Again from the start after each death: a run leaves nothing behind that the next could go on with.
         while True:
             try:
                 outcome = self.helper.carry_out(order, self.until - time.monotonic(), self._answer)
@@ -164,6 +165,7 @@ class _Run:
         self.over = True
         # Ends the wait in `_answer`; if none is under way, `over` is seen at the next question.
         self._answers.put(Answer(error=_STOPPED))
+        # Whatever it computes is of no use any more, and it might hold on for minutes.
         self.helper.kill()
 
     def _note_death(self, error: HelperDied) -> None:

@@ -124,6 +124,7 @@ class Registry(Closing):
         error
             Why it was refused.
         """
+        # Not every text can be part of a key: percent-encoded, any can, and its sender can work it out.
         chunk = quote(mission_id, safe="")
         if len(chunk) > MOST_ANSWERED_CHARACTERS:
             return
@@ -178,6 +179,7 @@ class Registry(Closing):
         waiting = [client for client in self.store.waiting_clients() if running[client] < self.most_running]
         if not waiting:
             return None
+        # Whoever has least at work comes first: else one client's hundred missions would hold every planner.
         fewest = min(running[client] for client in waiting)
         client = self._order.next(client for client in waiting if running[client] == fewest)
         self._order.note(client)

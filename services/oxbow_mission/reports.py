@@ -43,6 +43,7 @@ class Reports:
         """
         if not self.store.knows(mission_id):
             raise InvalidRequest("is not kept here; expected a mission submitted before", where=mission_id)
+        # Counted in memory: to add up the table for every report would take ever longer.
         self._require_room(mission_id, len(payload))
         with self.database.transaction() as db:
             db.execute("INSERT INTO report VALUES (?, ?, ?)", (mission_id, time.time(), payload))

@@ -109,6 +109,7 @@ class Run:
 
     def _reply(self, ask: Ask, endpoint: Endpoint[Q, R]) -> R:
         """What a stage replies; a replica that replies what is no answer is one to pass over."""
+        # The bus asks the replica with the fewest requests: asked again, another one may answer.
         for _ in range(MOST_WRONG):
             answer = self.peer.ask(ask)
             if answer.error is not None:

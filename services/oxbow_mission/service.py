@@ -71,6 +71,7 @@ class MissionService(Closing):
         self.checks = checks
         self.waiters = Waiters()
         self._over = threading.Event()
+        # Answered by threads of their own: the registry calls with its lock held, and a plan may be megabytes.
         self._finals = Mailbox[tuple[Waiter, MissionStatus]]("plans", self._answer_final, size=MOST, workers=2)
         registry.on_final = self._on_final
         bus.subscribe(_any("request"), self._on_request, queue_size=MOST_UNREAD)
@@ -82,6 +83,7 @@ class MissionService(Closing):
         ]
         bus.answer(_any("cancel"), self._cancel, queue_size=MOST_QUEUED)
         bus.answer(_any("status"), self._status, workers=2, queue_size=MOST_QUEUED)
+        # The latest plan, and each revision's under a key of its own.
         history = [_any(what, revision) for what in ("plan", "replan") for revision in (None, ANY)]
         bus.answer(history, self._history, workers=2, queue_size=MOST_QUEUED)
         self._keeper = threading.Thread(target=self._keep_house, name="keeper", daemon=True)

@@ -79,6 +79,8 @@ class Waiters:
             Too many wait already, of this client or in all, or they hold too many bytes.
         """
         with self._lock:
+            # Bounds for one client and for all: one that asks for thousands of plans must leave room for the
+            # others.
             own, every = self._counts[waiter.client], self._counts.total()
             own_bytes, every_bytes = self._bytes[waiter.client], self._bytes.total()
             if own >= MOST_PER_CLIENT or every >= MOST:
@@ -103,6 +105,7 @@ class Waiters:
     def let_go(self, gone: Collection[str]) -> int:
         """Drop queries whose client is gone or whose time is up; return how many these were."""
         now = time.monotonic()
+        # Taken out under the lock, answered after it: an answer goes over the network.
         left = self._take_if(lambda waiter: waiter.client in gone)
         late = self._take_if(lambda waiter: waiter.until < now)
         for waiter in left:

@@ -103,6 +103,7 @@ class Task:
         Infeasible
             No water leads from the launch or the recovery point to the free space.
         """
+        # The finest spacing bounds the work, whatever the length would allow.
         least_spacing_m = max(request.min_spacing_m, finest_spacing_m(request.space))
         nominal_m = nominal_spacing_m(request.space.free.area, request.length_m, least_spacing_m)
         waters = prepared_waters(request, nominal_m)
@@ -261,6 +262,7 @@ def prepared_waters(request: PathRequest, spacing_m: float) -> Waters:
     # Prepared once: the same polygons are asked thousands of times by every method.
     shapely.prepare([free, water])
     shore = leg_routes(free, water)
+    # Everything turns together: methods know no other frame than that of the sweep.
     (launch, recovery) = turn(np.array([request.launch, request.recovery]))
     return Waters(
         spacing_m=spacing_m,

@@ -136,6 +136,7 @@ class Shore:
         unsafe = self._unsafe(segments, outside)
         # How far each leg reaches, and what of both kinds of stretches falls to it.
         total_m = segments.length_m
+        # A path that begins elsewhere has no leg: what would excuse one is the place that it leaves.
         off_m = shapely.distance(
             shapely.points([launch, recovery]), shapely.points(segments.ends[[0, -1], [0, 1]])
         )
@@ -192,6 +193,7 @@ class Shore:
         home_m = self._reach_m(path.reverse(), path.length - unsafe[::-1, ::-1])
         if out_m + home_m < path.length:
             return out_m, home_m
+        # All of it is near the shore: only what begins or ends with the path itself is a leg.
         begins, ends = unsafe[:, 0] <= ROUNDING_M, unsafe[:, 1] >= path.length - ROUNDING_M
         if (begins & ends).any():
             return 0.0, 0.0
@@ -231,6 +233,7 @@ class Shore:
         # The water that the leg leads to: the nearest to a place ashore may be a pond behind it.
         water = self._parts[np.argmin(shapely.distance(self._parts, path.interpolate(end.open_m)))]
         unsafe_m, ashore_m = covered_m(unsafe), float(water.distance(Point(end.place)))
+        # A leg straight off the shore is always excused; a longer one only by the shortest way that there is.
         direct_m = direct_leg_m(self.safety_m, ashore_m)
         # The shortest way takes a triangulation: computed only where the direct length does not excuse the leg.
         return Leg(

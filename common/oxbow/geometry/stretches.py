@@ -41,6 +41,7 @@ class PathSegments:
         segment = np.clip(np.searchsorted(self.start_m, along_m, side="right") - 1, 0, None)
         start, end = self.ends[segment].transpose(1, 0, 2)
         step = end - start
+        # Not clipped: rounding may lead a hair beyond a segment's end, which is as good a place.
         share = (along_m - self.start_m[segment]) / np.hypot(*step.T)
         return np.asarray(start + share[:, None] * step)
 

@@ -75,6 +75,7 @@ def spread(square: FloatArray, region: BaseGeometry) -> FloatArray:
     # From the right: a triangle without area is passed over, and never divided by.
     chosen = np.minimum(np.searchsorted(ends_m2, at_m2, side="right"), len(ends_m2) - 1)
     left = np.clip((ends_m2[chosen] - at_m2) / areas_m2[chosen], 0.0, 1.0)
+    # c is the apex, and what is left of the triangle's area shrinks towards it.
     a, b, c = np.moveaxis(corners[chosen], 1, 0)
     # The part of a triangle within a share s of its height from the apex has the share s^2 of its area.
     from_apex, along = np.sqrt(left)[:, None], square[:, 1:]

@@ -213,6 +213,7 @@ def _inside(place: str) -> Iterator[None]:
     try:
         yield
     except InvalidInput as error:
+        # Places are put in front from the inside out: `features[3]`, then `PriorModel` before it.
         dot = "" if error.where.startswith("[") or not error.where else "."
         raise InvalidMission(error.message, f"{place}{dot}{error.where}") from error
 
@@ -266,6 +267,7 @@ def prior_document(prior: PriorModel) -> dict[str, Any]:
 
 
 def _feature_document(feature: PriorFeature) -> dict[str, Any]:
+    # Only what was given: a null would come back as another document than was read.
     known = {"weight": feature.weight, "value": feature.value}
     properties = {name: value for name, value in known.items() if value is not None} | feature.properties
     geometry = mapping(feature.geometry)

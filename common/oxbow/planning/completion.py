@@ -135,6 +135,7 @@ def _paths(mission: Mission, written: Sequence[Sequence[_Written]]) -> dict[str,
 
 def _figures(mission: Mission, written: Sequence[_Written]) -> dict[str, Any]:
     """What the record says of one team as a whole."""
+    # Shares may have a heading each: only one that all have in common is the plan's.
     headings = {each.plan.heading_rad for each in written}
     heading_rad = headings.pop() if len(headings) == 1 else None
     # A treatment has no spacing: its passes are a swath apart.

@@ -109,6 +109,7 @@ class Submission:
     @cached_property
     def fingerprint(self) -> str:
         """Equal for two submissions that this version of Oxbow gives the same plan."""
+        # Neither who asks nor how long they wait changes the plan.
         options = msgspec.structs.replace(self.parameters, id=None, deadline_s=DEFAULT_DEADLINE_S, client="")
         # A newer Oxbow may plan the same mission otherwise: what an older one planned does not answer for it.
         digest = hashlib.sha256(_version().encode())

@@ -59,6 +59,7 @@ def serve_stage(endpoint: str, handler: str, argv: list[str] | None = None) -> N
 def _serve(session: Session, worker: Worker, options: argparse.Namespace, lifetime: Lifetime) -> None:
     stage = Stage(session, worker, options.instance, options.queue, on_failure=lifetime.end)
     lifetime.wait()
+    # What was accepted is still answered: only then may the process end.
     stage.drain()
     if stage.failed:
         raise Unavailable("no worker process", where=options.instance)

@@ -73,6 +73,7 @@ def in_order(problem: Problem, vehicle: int, path: Indices, held: int) -> Indice
     ndarray of int
         The same rows.
     """
+    # The leading targets stay: a vehicle under way must not be sent elsewhere.
     better = np.concatenate([path[:held], improved_path(problem.figures[COST, vehicle], path[held:])])
     return better if problem.is_within_range(vehicle, better) else path
 
@@ -80,6 +81,7 @@ def in_order(problem: Problem, vehicle: int, path: Indices, held: int) -> Indice
 def _near(problem: Problem) -> Indices:
     """The nearest targets of every target and of every start, shape (n + v, k)."""
     away = problem.mean_costs[: problem.count + len(problem.vehicles), : problem.count].copy()
+    # No target is near itself.
     away[np.diag_indices(problem.count)] = np.inf
     k = min(NEAR, problem.count)
     return np.argsort(away, axis=1, kind="stable")[:, :k]
@@ -131,6 +133,7 @@ def _relocations(layout: Layout, near: Indices, length: int) -> _Moves:
     before, after, first, last = rows[edges], rows[edges + 1], rows[at], rows[end]
     kept = figures[:, taker, before, first] + figures[:, taker, last, after]
     turned = figures[:, taker, before, last] + figures[:, taker, first, after]
+    # By cost alone: where the cheaper way round is too long, the move is not made at all.
     is_turned = turned[COST] < kept[COST]
     inside = layout.between(taker, at, end)
     taken = layout.totals[:, taker] - layout.edge[:, edges] + inside + np.where(is_turned, turned, kept)

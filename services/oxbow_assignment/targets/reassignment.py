@@ -88,6 +88,7 @@ def reassign(problem: Problem, tours: Sequence[Sequence[int]], *, hysteresis_s: 
             (_Candidate.of(problem, best.paths, bound, current) for bound in freed),
             key=lambda candidate: candidate.rank(hysteresis_s),
         )
+        # Strictly better each round, or the same candidates would come round for ever.
         if found.rank(hysteresis_s) >= best.rank(hysteresis_s):
             break
         best = found

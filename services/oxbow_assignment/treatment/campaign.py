@@ -132,6 +132,7 @@ def plan_campaign(
     """
     require_treatable(spots)
     shapely.prepare(free)  # thousands of lines are tested against it
+    # 1. Who treats, and what: only the water of each hot spot counts.
     fleet = Fleet.of(slaves, free, free if water is None else water, danger, router)
     found = tuple(waters(spots, free))
     # Between passes there is next to nothing to choose: the funnel finds the shortest way, and at once.
@@ -141,6 +142,7 @@ def plan_campaign(
         for spot, water in zip(spots, found, strict=True)
         if not water.is_empty
     )
+    # 2. Passes, in parts that a sortie can reach, and what no sortie reaches.
     division = divide_treatments(treatments, fleet)
     left = [*_dry(spots, found, free), *_out_of_reach(treatments, division, fleet)]
     return Campaign(
@@ -174,6 +176,7 @@ def _out_of_reach(treatments: Sequence[Treatment], division: Division, fleet: Fl
         own = [stretch for stretch in division.out_of_reach if stretch.part.treatment == number]
         if not own:
             continue
+        # The reason is that of the stretch that comes nearest to being reached: the others fail by more.
         nearest = min(own, key=lambda stretch: stretch.access_m - fleet.lengths_m[stretch.slave])
         slave = fleet.slaves[nearest.slave]
         share = sum(stretch.part.until - stretch.part.since for stretch in own)

@@ -106,6 +106,7 @@ def divide_treatments(treatments: Sequence[Treatment], fleet: Fleet) -> Division
     Infeasible
         It would take hundreds of sorties.
     """
+    # Whole treatments at first; what does not fit is divided, and tried again.
     pieces = [
         Part(number, treatment.spot.name, 0.0, 1.0, treatment.line, treatment.spot.value)
         for number, treatment in enumerate(treatments)
@@ -120,6 +121,7 @@ def divide_treatments(treatments: Sequence[Treatment], fleet: Fleet) -> Division
         for piece, length_m, own in zip(pieces, ways.lengths_m.tolist(), spare.T, strict=True):
             slave = int(own.argmax())
             is_far = own[slave] + length_m < 0.0 and fleet.finds_shortest
+            # It fits, can never fit, or is divided.
             if length_m <= own[slave]:
                 parts.append(piece)
             elif is_far or length_m <= LEAST_PART * fleet.lengths_m[slave]:
@@ -137,6 +139,7 @@ def divide_treatments(treatments: Sequence[Treatment], fleet: Fleet) -> Division
             f" {MOST_PARTS}: a wider swath, or vehicles of longer range",
             where="hot_spots",
         )
+    # Rounds have mixed them up: a short treatment fits at once, a long one after several rounds.
     parts.sort(key=lambda part: (part.treatment, part.since))
     return Division(tuple(parts), tuple(out_of_reach))
 

@@ -87,6 +87,7 @@ def treatment_of(spot: HotSpot, water: BaseGeometry, free: Polygon, router: Rout
     InvalidRequest
         The swath is so small that the hot spot would take thousands of passes.
     """
+    # Before the passes are made: a tiny swath would make millions of them.
     _require_few(passes_needed(water, swath_m), spot, swath_m)
     # In a hot spot of thin pieces the middle of every band may be land: then each piece gets passes of its own.
     more = parallel_passes(water, free, swath_m) or _further_passes(Polygon(), water, free, swath_m)
@@ -115,6 +116,7 @@ def _further_passes(treated: BaseGeometry, water: BaseGeometry, free: Polygon, s
     missed = shapely.get_parts(shapely.difference(water, treated))
     missed = missed[np.argsort(-shapely.area(missed), kind="stable")]
     areas = shapely.area(missed)
+    # `left[k]` is what would still be missed if only the k largest pieces were treated.
     left = np.cumsum(areas[::-1])[::-1]
     pieces = missed[left > (1.0 - COVERED) * water.area].tolist()
     return [line for piece in pieces for line in chord(piece, free, swath_m)]
@@ -142,6 +144,7 @@ def ordered_passes(passes: Sequence[LineString], free: Polygon) -> list[LineStri
         return list(passes)
     ends = np.array([line.coords[end] for line in passes for end in (0, -1)])
     apart = _distances(ends, free)
+    # Both ends of a pass stay neighbours all along, so that every other row is where a pass begins.
     rows = improved_path(*_as_path(apart, _nearest_next(apart)))[1:-1]
     return [_directed(passes[row // 2], backwards=bool(row % 2)) for row in rows[::2].tolist()]
 
@@ -165,6 +168,7 @@ def linked_passes(passes: Sequence[LineString], free: Polygon, router: Router) -
     """
     parts = [passes[0]]
     for before, after in pairwise(passes):
+        # Most ways between neighbouring passes are straight: only the others are worth a search.
         way = LineString([before.coords[-1], after.coords[0]])
         if not free.covers(way):
             parts.append(router.route(*way.coords).line)

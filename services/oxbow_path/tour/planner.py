@@ -220,6 +220,7 @@ class _Attempt:
     def _sites(self, entries: FloatArray, count: int, pitch_m: float) -> FloatArray:
         if count == 0:
             return entries
+        # Centres of clusters may leave water far away, in a corner or an arm: sites are added there.
         centres = cluster_centres(self._samples, count, self.waters.free)
         return with_gaps(np.vstack([entries, centres]), self.waters.probe.points, GAP * pitch_m)
 

@@ -118,6 +118,7 @@ def fit_spacing(
 def _longest(trials: Sequence[Trial], budget: Budget) -> Trial:
     """The longest trial that fits."""
     fitting = [trial for trial in trials if budget.fits(trial.length_m)]
+    # Longest, not finest: length is what a path may use, and more of it serves the water better.
     if fitting:
         return max(fitting, key=lambda trial: trial.length_m)
     shortest_m = min(trial.length_m for trial in trials)

@@ -139,6 +139,7 @@ def walk_round_tree(waters: Waters, pattern: Pattern, circuit: Circuit) -> Trial
     Trial
         Simple, and inside the free space except for its legs, whatever its length.
     """
+    # The brush draws bands half a spacing to either side of the tree's lines: the walk runs along their edge.
     brush = Brush(waters.free, pattern.half_width_m, pattern.trim_m)
     connected = partial(
         simply_connected, free=waters.free, probe=waters.probe, cut_width_m=pattern.cut_m, reach_m=pattern.reach_m
@@ -181,6 +182,7 @@ def trial_with_legs(waters: Waters, pattern: Pattern, circuit: Circuit, walk: Wa
             break
         walk = Walk(_smoothed(walk.region, waters, width_m), walk.cuts, walk.enclosed)
         width_m /= 4
+    # A ring that touches itself even now makes no simple path with any legs: that raises.
     path = path_with_legs(
         walk.region,
         waters.launch,
@@ -210,6 +212,7 @@ def _started(waters: Waters, circuit: Circuit, brush: Brush) -> Polygon:
 
 def _straightened(region: Polygon, waters: Waters, tolerance_m: float) -> Polygon:
     """The region with fewer vertices, still inside the free space, and unchanged near the entries."""
+    # Simplified lines may cut corners over land: what leaves the free space is taken off again.
     simple = region.simplify(tolerance_m).intersection(waters.free)
     kept = shapely.union_all([entry.buffer(4 * tolerance_m) for entry in waters.entries])
     return clear_of_land(simple.union(region.intersection(kept)), waters.free)

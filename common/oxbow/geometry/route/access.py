@@ -142,6 +142,7 @@ def way_to(area: BaseGeometry, routes: Routes, place: Place, *, where: str = "pl
 def _way_afloat(area: BaseGeometry, routes: Routes, berth: Place, where: str) -> FloatArray:
     point = Point(berth)
     straight = shapely.shortest_line(point, area)
+    # By length, not by containment: a line along the shore is on either side of it by rounding.
     if straight.difference(routes.water).length <= ROUNDING_M:
         return np.asarray(shapely.get_coordinates(straight))
     route = routes.to_area(np.array(berth), area, routes.goals_in(area))

@@ -112,6 +112,7 @@ class Danger:
         if not self.zones or not len(starts):
             return total
         lines = np.asarray(shapely.linestrings(np.stack([starts, ends], axis=1)))
+        # Zones are few and edges many: the tree is one of edges, and each zone asks for those that it meets.
         tree = STRtree(lines)
         for zone, core in zip(self.zones, self._cores, strict=True):
             met = tree.query(core, predicate="intersects")
@@ -142,6 +143,7 @@ class Danger:
     @cached_property
     def _cores(self) -> tuple[BaseGeometry, ...]:
         """The zones' areas without their rims, prepared."""
+        # Mitred: round joins would add vertices at the corners of zones.
         cores = tuple(zone.area.buffer(-RIM_M, join_style="mitre") for zone in self.zones)
         shapely.prepare(cores)
         return cores

@@ -185,6 +185,8 @@ class Routes:
         if len(first) == 0 or len(goals) == 0:
             return None
         ways = cheapest_ways(self._graph, first)
+        # Three parts: straight to a gate, over gates, and straight on: the least sum decides, not the nearest
+        # gate.
         length_m = np.hypot(*(places[first] - start).T)[:, None] + ways.costs[:, goals]
         if onward is not None:
             length_m += np.hypot(*(places[goals] - onward).T)

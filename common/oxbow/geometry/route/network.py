@@ -176,6 +176,7 @@ class NetworkRouter:
     def _found(self, points: FloatArray, names: Sequence[str], *, starts: int) -> _Found:
         """Search the network with the points inserted, from the first `starts` of them to all."""
         network = self.network
+        # Refused here if they are no places in the water; the error names them as the caller does.
         ends = Ends(points, network.mesh.touches(points, names))
         links = network.links(ends)
         departure = len(network.places)
@@ -205,6 +206,7 @@ class NetworkRouter:
         first, last = np.nonzero(np.triu(np.isfinite(found.costs), 1))
         lines = [self._line(found, i, j) for i, j in zip(first.tolist(), last.tolist(), strict=True)]
         if lines:
+            # All edges of all lines at once: zones are intersected once, not once a line.
             starts, ends = np.vstack([line[:-1] for line in lines]), np.vstack([line[1:] for line in lines])
             owner = np.repeat(np.arange(len(lines)), [len(line) - 1 for line in lines])
             costs[first, last] = np.bincount(owner, self.network.danger.costs(starts, ends))

@@ -142,6 +142,7 @@ def measured_route(polyline: FloatArray, mesh: WaterMesh, danger: Danger, method
     """
     polyline = _without_repeats(polyline)
     starts, ends = polyline[:-1], polyline[1:]
+    # Edges count entries into zones; one that starts inside a zone does not enter it.
     at_start = danger.hazards_at(polyline[:1]).sum()
     return Route(
         polyline=polyline,

@@ -70,12 +70,15 @@ def sights(
     Sights
         Pairs may occur more than once.
     """
+    # Sorted by triangle, so that a cone finds the places in its triangle by bisection.
     by_triangle = np.argsort(sought.triangle, kind="stable")
     held = Touches(sought.place[by_triangle], sought.triangle[by_triangle])
+    # An eye sees all of the triangles that it touches; beyond them, what its cones reach.
     found_corners = [_counted(*at.sides(), wanted)]
     eye_at, place = _held(at.triangle, held)
     found_places = [(at.place[eye_at], place)]
     cones = _first_cones(mesh, eyes, at)
+    # Ends: no straight line enters a triangle twice, so that no cone takes more steps than there are triangles.
     while len(cones.eye):
         apex = mesh.tails[following(following(cones.side))] - eyes[cones.eye]
         seen = _is_in(cones, apex)
@@ -95,6 +98,7 @@ def _first_cones(mesh: WaterMesh, eyes: FloatArray, at: Touches) -> _Cones:
     """From each triangle that an eye looks out of, through the sides that it does not lie on."""
     eye, side = at.sides()
     right, left = mesh.tails[side] - eyes[eye], mesh.heads[side] - eyes[eye]
+    # A side that the eye lies on, or in line with, has no width as seen from there.
     through = _is_left(left, of=right) & (mesh.twins[side] >= 0)
     return _Cones(eye[through], mesh.twins[side[through]], right[through], left[through])
 
@@ -102,6 +106,7 @@ def _first_cones(mesh: WaterMesh, eyes: FloatArray, at: Touches) -> _Cones:
 def _parted(mesh: WaterMesh, cones: _Cones, apex: FloatArray) -> _Cones:
     """The cones beyond the triangles entered; they split at the opposite corner, `apex` as seen from the eye."""
     to_right, to_left = following(cones.side), following(following(cones.side))
+    # The apex left of the cone sends all of it through the right side, and the other way round; else it splits.
     below_left, above_right = _is_left(cones.left, of=apex), _is_left(apex, of=cones.right)
     pass_right = above_right & (mesh.twins[to_right] >= 0)
     pass_left = below_left & (mesh.twins[to_left] >= 0)
@@ -139,5 +144,6 @@ def _is_in(cones: _Cones, directions: FloatArray) -> Mask:
 
 def _is_left(a: FloatArray, *, of: FloatArray) -> Mask:
     """Whether directions lie to the left of others, by more than rounding."""
+    # Relative to both lengths, so that the slack is an angle, however far the directions reach.
     slack = IN_LINE * np.hypot(a[:, 0], a[:, 1]) * np.hypot(of[:, 0], of[:, 1])
     return np.asarray(cross(of, a) > slack)

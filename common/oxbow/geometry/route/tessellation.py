@@ -82,6 +82,7 @@ class Tessellation:
         """See `Network.arcs`: along the sides of triangles, from vertices to the lattice, and within that."""
         vertices, sectors = self.mesh.sector_places, self.mesh.sectors
         along_sides = np.column_stack([sectors, sectors[following(np.arange(len(sectors)))]])
+        # Obstacle vertices are joined to the lattice around them, as the report has it.
         vertex, near = self._near(vertices)
         # Where shores touch, a line that ends there could arrive from either side.
         alone = KDTree(vertices).query_ball_point(vertices, ROUNDING_M, return_length=True) == 1
@@ -97,10 +98,12 @@ class Tessellation:
 
     def reduced(self, way: Way) -> FloatArray:
         """The cheapest polyline along the lines of sight between the places of a way."""
+        # As a small visibility graph of the way's own places: the search over it is exact.
         places = np.vstack([way.start, self.places[way.nodes], way.goal])
         ends, inner = way.ends.at, self._touches.among(way.nodes)
         last = len(places) - 1
         touches = Touches(last * ends.place, ends.triangle) + Touches(1 + inner.place, inner.triangle)
+        # No corner is asked for: a reduced way bends only where the way found did.
         nothing = np.zeros(len(self.mesh.tails), dtype=np.bool_)
         seen = sights(self.mesh, places, touches, places, touches, nothing)
         pairs = np.column_stack([seen.place_eyes, seen.places])
@@ -111,6 +114,8 @@ class Tessellation:
     @cached_property
     def _lattice(self) -> _Lattice:
         """The lattice in the water."""
+        # The lattice fills the box, land included: what is not in the water, or leads over land, is dropped
+        # afterwards.
         places, pairs = joined_lattice(self.mesh.points.min(axis=0), self.mesh.points.max(axis=0), self.side_m)
         touches = self.mesh.holding(places)
         wet = np.unique(touches.place)
