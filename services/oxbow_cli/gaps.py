@@ -83,6 +83,7 @@ class Unit:
         Unit
             Its length in metres.
         """
+        # A treatment has no best radius for its length: what it should keep to is its swath.
         if treats and mission.treated_swath_m is not None:
             return cls(mission.treated_swath_m / 2, "half swaths")
         return cls(judgement.certificate.least_radius_m, "least radii")

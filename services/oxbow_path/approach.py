@@ -25,7 +25,7 @@ from oxbow.errors import Infeasible
 from oxbow.geometry.conformance import SHORE_TOLERANCE_M
 from oxbow.geometry.lanes import lane
 
-__all__ = ["joined_to_legs", "within_share"]
+__all__ = ["plan_with_legs", "within_share"]
 
 HALVINGS = 8
 """How often the distance of legs from their middle lines may be halved until both fit."""
@@ -60,7 +60,7 @@ def within_share(request: PathRequest, approach: Approach) -> PathRequest:
     )
 
 
-def joined_to_legs(plan: PathPlan, request: PathRequest, approach: Approach) -> PathPlan:
+def plan_with_legs(plan: PathPlan, request: PathRequest, approach: Approach) -> PathPlan:
     """The plan of a share with its legs: from the vehicle's start to its recovery.
 
     Parameters
@@ -72,12 +72,17 @@ def joined_to_legs(plan: PathPlan, request: PathRequest, approach: Approach) -> 
     approach
         The legs to the share.
 
+    Returns
+    -------
+    PathPlan
+        The same but for its path, and a warning where the legs leave much of the length unused.
+
     Raises
     ------
     Infeasible
         The water is too narrow for both legs.
     """
-    path = joined(plan.path, approach)
+    path = path_with_approach(plan.path, approach)
     in_share = plan.path.length / (request.length_m - approach.legs_m)
     of_all = path.length / request.length_m
     # The stage itself says why the path in the share leaves length; here, what was kept for the legs is left.
@@ -86,8 +91,8 @@ def joined_to_legs(plan: PathPlan, request: PathRequest, approach: Approach) -> 
     return structs.replace(plan, path=path, warnings=(*plan.warnings, text) if unused else plan.warnings)
 
 
-def joined(path: LineString, approach: Approach) -> LineString:
-    """A path in a share with its legs; see `joined_to_legs`.
+def path_with_approach(path: LineString, approach: Approach) -> LineString:
+    """A path in a share with its legs; see `plan_with_legs`.
 
     Parameters
     ----------
@@ -101,6 +106,7 @@ def joined(path: LineString, approach: Approach) -> LineString:
     LineString
         Simple; its legs keep to the approach's water.
     """
+    # To the tolerance of the rules: a lane along the shore is off it by rounding.
     water = MultiPolygon(approach.water).buffer(SHORE_TOLERANCE_M)
     for candidate in _candidates(shapely.get_coordinates(path), approach):
         line = candidate.line
@@ -141,7 +147,7 @@ def _candidates(path: FloatArray, approach: Approach) -> Iterator[_Candidate]:
         # Two gates: the middle lines themselves may be clear of each other.
         yield _Candidate(shapely.get_coordinates(out.line), path, shapely.get_coordinates(home.line)[::-1])
     line = LineString(path)
-    # From wide to narrow: `joined` takes the first that fits, and legs far apart are the easiest to follow.
+    # From wide to narrow: `path_with_approach` takes the first that fits, and legs far apart are the easiest to follow.
     for apart_m in approach.apart_m * 0.5 ** np.arange(HALVINGS):
         for side, way in itertools.product((1.0, -1.0), _ways_round(line, approach, apart_m)):
             yield _Candidate(lane(out, side * apart_m), way, lane(home, -side * apart_m)[::-1])

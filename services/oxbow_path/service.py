@@ -12,7 +12,7 @@ from shapely import LineString
 from oxbow.contracts import Method, PathPlan, PathRequest
 from oxbow.contracts.budget import WELL_USED
 from oxbow.wire.recording import Show
-from oxbow_path.approach import joined_to_legs, within_share
+from oxbow_path.approach import plan_with_legs, within_share
 from oxbow_path.conformance import require_conforming
 from oxbow_path.course import best_plan
 from oxbow_path.dropped import dropped_parts
@@ -56,7 +56,7 @@ def handle(request: PathRequest, show: Show) -> PathPlan:
     if approach is None or not approach.has_legs:
         return planned_path(request, stop, show)
     plan = planned_path(within_share(request, approach), stop, show, spent_m=approach.legs_m)
-    return joined_to_legs(plan, request, approach)
+    return plan_with_legs(plan, request, approach)
 
 
 def planned_path(request: PathRequest, stop: Stop, show: Show, spent_m: float = 0.0) -> PathPlan:
@@ -84,6 +84,7 @@ def planned_path(request: PathRequest, stop: Stop, show: Show, spent_m: float = 
         The path broke a rule: a fault of the planner.
     """
     task = Task.of(request, stop, spent_m)
+    # Methods work in the sweep frame; what is shown and returned is turned back.
     display = Display(show, request.decomposition.heading_rad)
     plan = best_plan(METHODS[request.method], task, display)
     claimed_m = min(plan.spacing_m, WIDEST * task.spacing_m)

@@ -56,6 +56,11 @@ def lane_length_m(middle: MiddleLine, apart_m: float) -> float:
         The middle line, from a place to a gate.
     apart_m
         How far to its right the lane runs; to its left where negative.
+
+    Returns
+    -------
+    float
+        In metres, the step from the lane's end to the gate included.
     """
     gate = shapely.get_coordinates(middle.line)[-1:]
     return LineString(np.vstack([lane(middle, apart_m), gate])).length

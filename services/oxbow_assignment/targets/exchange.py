@@ -176,6 +176,7 @@ def _swaps(layout: Layout, near: Indices) -> _Moves:
             swapped[tour][here - layout.firsts[tour]] = rows[there]
         return swapped
 
+    # Each has to be able to do what the other did.
     allowed = layout.problem.has_role[one, rows[with_]] & layout.problem.has_role[other, rows[at]]
     gains = layout.gains(one, changed(at, rows[with_]), other, changed(with_, rows[at]), allowed)
     return _Moves(gains, one, other, paths)

@@ -9,7 +9,7 @@ from shapely import LineString, Point, Polygon, box
 from oxbow.contracts import Approach, Role, Share, Vehicle
 from oxbow.errors import Infeasible
 from oxbow_assignment.shares.approach import Harbour
-from oxbow_path.approach import joined
+from oxbow_path.approach import path_with_approach
 
 LAKE = box(0, 0, 1000, 400) - box(300, 100, 500, 400)
 FREE = LAKE.buffer(-5.0, join_style="mitre")
@@ -45,7 +45,7 @@ def share_of(start, recovery=None, *, spacing_m=SPACING_M, length_m=1e5) -> Shar
 
 def whole(approach: Approach, start, recovery) -> LineString:
     assert approach.launch == approach.recovery
-    path = joined(ring(EAST, approach.launch), approach)
+    path = path_with_approach(ring(EAST, approach.launch), approach)
     assert path.is_simple
     assert (path.coords[0], path.coords[-1]) == (start, recovery)
     return path
@@ -76,7 +76,7 @@ def test_out_from_one_place_and_home_to_another(start, recovery):
 def test_what_legs_take_is_their_length(start, spacing_m):
     approach = share_of(start, spacing_m=spacing_m).approach
     around = ring(EAST, approach.launch)
-    taken_m = joined(around, approach).length - around.length
+    taken_m = path_with_approach(around, approach).length - around.length
     # What is kept back and not used, the vehicle does not survey with.
     assert taken_m <= approach.legs_m <= taken_m + 0.5 * spacing_m
 
@@ -110,7 +110,7 @@ def test_lanes_are_as_narrow_as_the_water():
     assert isinstance(east, Polygon)
     approach = Harbour(free, strait, SPACING_M).share(east, vehicle((100.0, 100.0))).approach
     assert 4.0 * approach.apart_m <= 2.0
-    path = joined(ring(east, approach.launch), approach)
+    path = path_with_approach(ring(east, approach.launch), approach)
     assert path.is_simple
     assert (path - free.buffer(0.01)).is_empty
 

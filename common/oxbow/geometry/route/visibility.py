@@ -137,6 +137,8 @@ class Bends:
         corners = np.flatnonzero(at_corner >= 0)
         places, before, after = np.full((3, np.count_nonzero(wide), 2), np.nan)
         places[at_corner[corners]] = mesh.tails[corners]
+        # Without zones a shortest route bends at shores alone, and touches them; round a zone it may bend either
+        # way.
         if not any_turn:
             begins, ends = at_corner[mesh.shore], at_corner[following(mesh.shore)]
             after[begins[begins >= 0]] = mesh.heads[mesh.shore[begins >= 0]]
