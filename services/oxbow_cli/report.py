@@ -320,6 +320,7 @@ def _conformance(is_simple: bool | None, found: Conformance) -> str:
     simple = {None: "", True: "never crosses itself; ", False: "CROSSES ITSELF; "}[is_simple]
     ashore_m, unsafe_m = _of_legs(found)
     legs = f"; on its legs {ashore_m:.2f} m over land, {unsafe_m:.0f} m within Safety" if unsafe_m else ""
+    # What legs need over land is part of all that lies outside: it is reported by itself.
     outside_m = max(found.outside_m - ashore_m, 0.0)
     return f"{simple}{outside_m:.2f} m outside, {found.unsafe_m:.2f} m within Safety{legs}"
 

@@ -66,6 +66,7 @@ class Order:
         seconds
             How long it was served; 0 at the beginning.
         """
+        # A client's seconds fade as time goes by: they are kept as of the moment when they were last counted.
         use, now_s = self._uses.pop(client, _Use()), time.monotonic()
         # Popped and put back at the end: the first in the dictionary is then the one noted longest ago.
         self._uses[client] = _Use(next(self._turns), use.recent_s(now_s) + seconds, now_s)

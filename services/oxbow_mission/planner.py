@@ -131,6 +131,7 @@ class _Run:
         self.shown = shown
         self.over = False
         parameters = msgspec.json.decode(job.request.parameters, type=SubmissionParameters)
+        # Monotonic here, wall-clock time for the stages: only the latter means the same to another process.
         self.until = time.monotonic() + parameters.deadline_s + GRACE_S
         self._call = BusCall(
             planner.bus,

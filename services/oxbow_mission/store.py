@@ -149,6 +149,8 @@ class Store:
         """
         checked_id(mission_id)
         with self.database.transaction() as db:
+            # What is asked now is compared with the latest revision only: an older one that was replaced is
+            # wanted anew.
             latest = db.execute(
                 f"SELECT {_STATUS}, fingerprint FROM revision WHERE mission_id = ? AND {_LATEST}",
                 (mission_id,),

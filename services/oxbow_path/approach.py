@@ -147,7 +147,7 @@ def _candidates(path: FloatArray, approach: Approach) -> Iterator[_Candidate]:
         # Two gates: the middle lines themselves may be clear of each other.
         yield _Candidate(shapely.get_coordinates(out.line), path, shapely.get_coordinates(home.line)[::-1])
     line = LineString(path)
-    # From wide to narrow: `path_with_approach` takes the first that fits, and legs far apart are the easiest to follow.
+    # From wide to narrow: the first that fits is taken, and legs far apart are the easiest to follow.
     for apart_m in approach.apart_m * 0.5 ** np.arange(HALVINGS):
         for side, way in itertools.product((1.0, -1.0), _ways_round(line, approach, apart_m)):
             yield _Candidate(lane(out, side * apart_m), way, lane(home, -side * apart_m)[::-1])

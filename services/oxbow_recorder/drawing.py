@@ -155,6 +155,7 @@ def _on_map(layer: Layer, frame: Frame, entity: str) -> Iterator[Drawn]:
         lines = [frame.to_degrees(strip)[:, ::-1] for strip in strips]
         archetype = rr.GeoLineStrings(lat_lon=lines, colors=colours[owners], radii=rr.Radius.ui_points(1.5))
         yield Drawn(f"map/{entity}/lines", archetype)
+    # Points by themselves: their size is one of the screen, not of the map.
     points, number = _points(layer.geometries)
     if len(points):
         places = frame.to_degrees(points)[:, ::-1]
