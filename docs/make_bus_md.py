@@ -61,8 +61,8 @@ from oxbow.contracts import (
     layer_key,
     live_key,
 )
-from oxbow.contracts.ids import MOST_ID_CHARACTERS
 from oxbow.errors import ErrorCode, ErrorReply
+from oxbow.ids import MOST_ID_CHARACTERS
 from oxbow.planning.submission import SubmissionParameters
 from oxbow.wire.envelope import Envelope, StageError
 from oxbow.wire.introspection import Info, Ping, Stats, Supervised, Supervision

@@ -22,8 +22,8 @@ from oxbow.contracts import (
     live_key,
     mission_key,
 )
-from oxbow.contracts.ids import excerpt
 from oxbow.errors import ErrorReply, Internal, InvalidMission, InvalidRequest, OxbowError, error_text
+from oxbow.ids import excerpt
 from oxbow.runtime.closing import Closing
 from oxbow_mission.checks import Checks
 from oxbow_mission.incoming import PutRequest, QueriedPlan, QueriedRequest

@@ -13,8 +13,8 @@ import zenoh
 from oxbow.bus.replicas import Replicas
 from oxbow.bus.session import Session, error_of, error_of_reply, is_timeout
 from oxbow.contracts import ANY_LIVE, MAX_REQUEST_BYTES, Endpoint, Message, live_service
-from oxbow.contracts.ids import MOST_ID_CHARACTERS
 from oxbow.errors import Busy, DeadlineExceeded, ErrorCode, Internal, InvalidRequest, OxbowError, Unavailable
+from oxbow.ids import MOST_ID_CHARACTERS
 from oxbow.wire import codec
 from oxbow.wire.envelope import Envelope
 from oxbow.wire.waits import checked_wait

@@ -20,7 +20,6 @@ from oxbow.bus.config import DEFAULT_ENDPOINT, client_config
 from oxbow.bus.mailbox import Mailbox
 from oxbow.bus.query import JSON, Query
 from oxbow.bus.subscription import Audience, Declared, OnQuery, OnSample, Subscription
-from oxbow.contracts.ids import excerpt
 from oxbow.errors import (
     Busy,
     DeadlineExceeded,
@@ -32,6 +31,7 @@ from oxbow.errors import (
     Unavailable,
     error_text,
 )
+from oxbow.ids import excerpt
 from oxbow.runtime.closing import Closing
 from oxbow.wire.envelope import StageError
 from oxbow.wire.strict_json import decode_json

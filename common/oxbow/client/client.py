@@ -32,8 +32,8 @@ from oxbow.contracts import (
     live_key,
     mission_key,
 )
-from oxbow.contracts.ids import excerpt
 from oxbow.errors import Busy, Internal, InvalidInput, Unavailable
+from oxbow.ids import excerpt
 from oxbow.mission.file import Mission, parse_mission, read_mission
 from oxbow.planning.submission import Submission, SubmissionParameters
 from oxbow.runtime.closing import Closing

@@ -18,8 +18,8 @@ import msgspec
 
 from oxbow.bus.client import Bus
 from oxbow.contracts import ANY, MissionKey, MissionStatus
-from oxbow.contracts.ids import excerpt
 from oxbow.errors import InvalidInput, InvalidRequest, OxbowError, Unavailable
+from oxbow.ids import excerpt
 from oxbow.mission.file import Mission, parse_mission
 from oxbow.runtime.closing import Closing
 from oxbow.wire.waits import checked_wait

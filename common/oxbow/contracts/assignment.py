@@ -12,7 +12,6 @@ from oxbow.arrays import Place
 from oxbow.contracts.approach import Approach
 from oxbow.contracts.contour import DroppedPart
 from oxbow.contracts.danger import DANGER_DETOUR_M, DangerZone
-from oxbow.contracts.ids import MOST_ID_CHARACTERS, excerpt
 from oxbow.contracts.message import (
     MOST_LENGTH_M,
     MOST_SEED,
@@ -24,6 +23,7 @@ from oxbow.contracts.message import (
 )
 from oxbow.contracts.route import RouteMethod
 from oxbow.errors import InvalidRequest, renamed
+from oxbow.ids import MOST_ID_CHARACTERS, excerpt
 from oxbow.tolerances import FARTHEST_M
 
 __all__ = ["AssignRequest", "Assignment", "HotSpot", "LeftSpot", "Role", "Share", "Sortie", "Vehicle"]

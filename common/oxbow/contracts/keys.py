@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from oxbow.contracts.ids import checked_id, excerpt
 from oxbow.errors import InvalidRequest
+from oxbow.ids import checked_id, excerpt
 
 __all__ = [
     "ANY",

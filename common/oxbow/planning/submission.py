@@ -13,8 +13,8 @@ from urllib.parse import quote
 import msgspec
 
 from oxbow.contracts import DEFAULT_DEADLINE_S, MOST_DEADLINE_S, checked_id, require_finite
-from oxbow.contracts.ids import excerpt
 from oxbow.errors import InvalidRequest
+from oxbow.ids import excerpt
 from oxbow.mission.file import Mission, PlanOptions, mission_json, parse_mission
 
 __all__ = ["Submission", "SubmissionParameters"]

@@ -14,8 +14,8 @@ from collections.abc import Callable
 
 from oxbow.bus.config import DEFAULT_ENDPOINT
 from oxbow.bus.session import Session
-from oxbow.contracts.ids import checked_id
 from oxbow.errors import InvalidInput, OxbowError, Unavailable
+from oxbow.ids import checked_id
 from oxbow.runtime.lifetime import Lifetime
 from oxbow.stage.service import Stage
 from oxbow.stage.worker import DEFAULT_MEMORY_MB, Worker

@@ -16,7 +16,6 @@ import msgspec
 from oxbow.bus.mailbox import Mailbox
 from oxbow.bus.query import MSGPACK, Query
 from oxbow.bus.session import Session
-from oxbow.contracts.ids import excerpt
 from oxbow.errors import (
     Busy,
     DeadlineExceeded,
@@ -27,6 +26,7 @@ from oxbow.errors import (
     Unavailable,
     error_text,
 )
+from oxbow.ids import excerpt
 from oxbow.stage.answered import Answered, digest, require_same
 from oxbow.stage.wire import Described, Done, Failed, Job, Shown
 from oxbow.stage.worker import Worker

@@ -7,8 +7,8 @@ import time
 
 import msgspec
 
-from oxbow.contracts.ids import MOST_ID_CHARACTERS, checked_id, excerpt
 from oxbow.errors import ErrorReply, InvalidRequest
+from oxbow.ids import MOST_ID_CHARACTERS, checked_id, excerpt
 from oxbow.wire.strict_json import decode_json
 from oxbow.wire.waits import MOST_WAIT_S
 
@@ -39,7 +39,7 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     Raises
     ------
     InvalidRequest
-        An id is not accepted (`oxbow.contracts.ids`), a number is not finite or out of bounds, or `part` is too
+        An id is not accepted (`oxbow.ids`), a number is not finite or out of bounds, or `part` is too
         long.
     """
 

@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from oxbow.contracts import layer_key, live_key, mission_key
-from oxbow.contracts.ids import MOST_ID_CHARACTERS, checked_id
 from oxbow.errors import InvalidRequest
+from oxbow.ids import MOST_ID_CHARACTERS, checked_id
 
 
 @pytest.mark.parametrize("text", ["lake", "a", "_", "-", "0f5c.1c2e-9", "x" * MOST_ID_CHARACTERS])
