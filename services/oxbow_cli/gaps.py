@@ -26,9 +26,11 @@ from oxbow.site.site import Site
 from oxbow_certificate.axes import Paths
 from oxbow_certificate.certify import Judgement, judge
 from oxbow_certificate.distance import PathDistance
-from oxbow_cli import sheet
+from oxbow_cli import chart, sheet
+from oxbow_cli.chart import GAP
 from oxbow_cli.evaluation import certify_request
-from oxbow_cli.sheet import GAP, INK
+from oxbow_cli.lettering import lettering
+from oxbow_cli.sheet import INK
 
 __all__ = ["GAPS", "MOST_RADII", "Unit", "draw_gaps"]
 
@@ -118,14 +120,14 @@ def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
         judgement = judge(request)
     unit = Unit.of(mission, judgement, treats=bool(request.areas))
     figures = _treated_figures(judgement, unit) if request.areas else _figures(judgement)
-    with sheet.lettering():
+    with lettering():
         # In the order in which things lie on top of one another; the magnified part avoids labels drawn before
         # it.
         figure, axes = sheet.new_sheet(site)
-        sheet.draw_site(axes, site, mission.safety_m)
+        chart.draw_site(axes, site, mission.safety_m)
         _draw_gaps(axes, judgement, unit)
         _note_worst_gap(axes, judgement, unit)
-        sheet.draw_ends(axes, site)
+        chart.draw_ends(axes, site)
         sheet.draw_scale_and_north(axes)
         _draw_magnified(figure, axes, site, judgement, unit, mission.safety_m)
         _draw_key(figure, unit)
@@ -136,17 +138,17 @@ def draw_gaps(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
 def _draw_gaps(axes: Axes, judgement: Judgement, unit: Unit) -> None:
     """The distance, the paths, and the disc that the worst gap would hold."""
     _draw_distance(axes, judgement.space.judged, judgement.paths, unit)
-    width = 0.6 * sheet.line_width(axes, 2.0 * unit.length_m)
+    width = 0.6 * chart.line_width(axes, 2.0 * unit.length_m)
     paths = [shapely.get_coordinates(path) for path in shapely.get_parts(judgement.paths)]
     lines = LineCollection(paths, colors=INK, linewidths=width, alpha=0.75, zorder=4)
     axes.add_collection(lines, autolim=False)
-    sheet.draw_disc(axes, judgement.cover.place, judgement.cover.low_m)
+    chart.draw_disc(axes, judgement.cover.place, judgement.cover.low_m)
 
 
 def _note_worst_gap(axes: Axes, judgement: Judgement, unit: Unit) -> None:
     (x, y), radius_m = judgement.cover.place, judgement.cover.low_m
     text = f"worst gap {sheet.distance_text(radius_m)}, {radius_m / unit.length_m:.2f} {unit.name}"
-    sheet.note(axes, (x, y + radius_m), text, colour=GAP)
+    chart.note(axes, (x, y + radius_m), text, colour=GAP)
 
 
 def _draw_magnified(
@@ -165,7 +167,7 @@ def _draw_magnified(
     size = _MAGNIFIED_IN / figure.get_figwidth(), _MAGNIFIED_IN / figure.get_figheight()
     inset = figure.add_axes((*corner, *size), facecolor=sheet.LAND, xticks=[], yticks=[])
     inset.set(xlim=(x - shown_m, x + shown_m), ylim=(y - shown_m, y + shown_m))
-    sheet.draw_site(inset, site, safety_m)
+    chart.draw_site(inset, site, safety_m)
     _draw_gaps(inset, judgement, unit)
     inset.spines[:].set(color=GAP, zorder=9)
     inset.set_title(f"the worst gap, {times:.2g} times larger", fontsize=8, color=GAP, loc="left", pad=4)
@@ -181,7 +183,7 @@ def _free_square(axes: Axes, site: Site, place: Place, side_m: float) -> Polygon
     x, y = (axis.ravel() for axis in np.meshgrid(corners_x, corners_y))
     squares = shapely.box(x, y, x + side_m, y + side_m)
     ends = shapely.MultiPoint([site.launch, site.recovery]).buffer(4 * rim_m)
-    occupied = shapely.union_all([site.outline, ends, sheet.labelled_area(axes)]).buffer(rim_m)
+    occupied = shapely.union_all([site.outline, ends, chart.labelled_area(axes)]).buffer(rim_m)
     free = squares[~shapely.intersects(occupied, squares)]
     return min(free, key=shapely.Point(place).distance, default=None)
 
@@ -215,7 +217,7 @@ def _draw_distance(axes: Axes, region: MultiPolygon, paths: Paths, unit: Unit) -
         aspect="auto",
         zorder=3.5,
     )
-    clip = sheet.patch(seen, facecolor="none", edgecolor="none")
+    clip = chart.patch(seen, facecolor="none", edgecolor="none")
     axes.add_patch(clip)
     image.set_clip_path(clip)
 

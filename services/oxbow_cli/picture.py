@@ -22,8 +22,10 @@ from oxbow.geometry.frame import lonlat
 from oxbow.mission.file import Mission
 from oxbow.mission.plan import PlanRecord, TreatmentRecord
 from oxbow.site.site import Site
-from oxbow_cli import sheet
-from oxbow_cli.sheet import GAP, INK
+from oxbow_cli import chart, sheet
+from oxbow_cli.chart import GAP
+from oxbow_cli.lettering import lettering
+from oxbow_cli.sheet import INK
 
 __all__ = ["draw"]
 
@@ -54,15 +56,15 @@ def draw(mission: Mission, path: Path, *, width_px: int = 2000) -> None:
         The suffix is neither of the two, the width is not positive, or the site is not valid.
     """
     sheet.checked_format(path, width_px)
-    with sheet.lettering():
+    with lettering():
         _draw(mission, Site.of(mission), path, width_px)
 
 
 def _draw(mission: Mission, site: Site, path: Path, width_px: int) -> None:
     figure, axes = sheet.new_sheet(site)
-    sheet.draw_site(axes, site, mission.safety_m)
+    chart.draw_site(axes, site, mission.safety_m)
     for spot in site.hot_spots:
-        axes.add_patch(sheet.patch(spot.area, facecolor=SPOT, edgecolor=GAP, linewidth=0.7, alpha=0.7, zorder=3))
+        axes.add_patch(chart.patch(spot.area, facecolor=SPOT, edgecolor=GAP, linewidth=0.7, alpha=0.7, zorder=3))
     _draw_danger(axes, site)
     paths = [site.frame.to_planar(lonlat(planned.path)) for planned in mission.planned_paths]
     if len(paths) == 1:
@@ -72,7 +74,7 @@ def _draw(mission: Mission, site: Site, path: Path, width_px: int) -> None:
         _draw_fleet(axes, paths, min(site.nominal_spacing_m, mission.treated_swath_m or math.inf))
         _draw_names_key(figure, [planned.name for planned in mission.planned_paths])
     _draw_findings(axes, mission, site)
-    sheet.draw_ends(axes, site)
+    chart.draw_ends(axes, site)
     sheet.draw_scale_and_north(axes)
     sheet.draw_header(figure, mission.site_name or "Survey mission", _figures(mission, site))
     sheet.save_sheet(figure, path, width_px)
@@ -83,11 +85,11 @@ def _draw_danger(axes: Axes, site: Site) -> None:
     style = {"facecolor": "none", "edgecolor": DANGER, "hatch": r"\\\\", "linewidth": 0.8, "zorder": 3.5}
     for zone in site.danger_zones:
         water = zone.area.intersection(site.outline)
-        axes.add_patch(sheet.patch(water, **style))
+        axes.add_patch(chart.patch(water, **style))
         # Not the centroid, which may lie on land where the zone is bent.
         place = water.representative_point()
         text = f"{zone.name}: danger {zone.probability:g} per {zone.per}"
-        sheet.note(axes, (place.x, place.y), text, colour=DANGER)
+        chart.note(axes, (place.x, place.y), text, colour=DANGER)
 
 
 def _draw_path(axes: Axes, xy: FloatArray, spacing_m: float) -> None:
@@ -97,7 +99,7 @@ def _draw_path(axes: Axes, xy: FloatArray, spacing_m: float) -> None:
             _pieces(xy),
             cmap=PROGRESS,
             array=np.linspace(0, 1, _COLOURS),
-            linewidths=sheet.line_width(axes, spacing_m),
+            linewidths=chart.line_width(axes, spacing_m),
             capstyle="round",
             joinstyle="round",
             zorder=4,
@@ -109,7 +111,7 @@ def _draw_path(axes: Axes, xy: FloatArray, spacing_m: float) -> None:
 def _draw_fleet(axes: Axes, paths: list[FloatArray], spacing_m: float) -> None:
     """Draw the path of each vehicle in its own colour, thin enough to keep legs of the least spacing apart."""
     for xy, colour in zip(paths, cycle(FLEET)):
-        axes.plot(*xy.T, color=colour, linewidth=sheet.line_width(axes, spacing_m), zorder=4)
+        axes.plot(*xy.T, color=colour, linewidth=chart.line_width(axes, spacing_m), zorder=4)
     axes.autoscale(False)
 
 
@@ -134,18 +136,18 @@ def _draw_findings(axes: Axes, mission: Mission, site: Site) -> None:
     for part in mission.plan.dropped:
         place = site.frame.to_planar(lonlat([part.place]))[0]
         axes.plot(*place, marker="x", markersize=7, markeredgewidth=1.8, color=GAP, zorder=6)
-        sheet.note(axes, (place[0], place[1]), f"dropped {sheet.area_text(part.area_m2)}", colour=GAP)
+        chart.note(axes, (place[0], place[1]), f"dropped {sheet.area_text(part.area_m2)}", colour=GAP)
     untreated = _untreated(mission.plan.treatment)
     for spot in (spot for spot in site.hot_spots if spot.name in untreated):
         place = spot.area.representative_point()
-        sheet.note(axes, (place.x, place.y), f"{spot.name}: not treated", colour=GAP)
+        chart.note(axes, (place.x, place.y), f"{spot.name}: not treated", colour=GAP)
     certificate = mission.plan.certificate
     # A treatment has no such gap: every pass leaves half a swath on either side.
     if certificate.worst_gap is not None and not site.teams[0].treats:
         x, y = site.frame.to_planar(lonlat([certificate.worst_gap]))[0]
         radius_m = certificate.cover_radius_m[0]
-        sheet.draw_disc(axes, (x, y), radius_m)
-        sheet.note(axes, (x, y + radius_m), f"widest gap {sheet.distance_text(radius_m)}", colour=GAP)
+        chart.draw_disc(axes, (x, y), radius_m)
+        chart.note(axes, (x, y + radius_m), f"widest gap {sheet.distance_text(radius_m)}", colour=GAP)
 
 
 def _draw_progress_key(figure: Figure) -> None:

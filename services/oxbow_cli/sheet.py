@@ -1,86 +1,47 @@
-"""The sheet for pictures of a mission: map, land and water, scale, header, and the file."""
+"""The sheet that a mission is drawn on: its size, scale, header and key, and the file."""
 
 from __future__ import annotations
 
 import io
-import logging
 import math
-import re
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import shapely
-from matplotlib import font_manager, patheffects, rc_context, rcParams
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, PathPatch
 from matplotlib.patches import Polygon as PolygonPatch
-from matplotlib.path import Path as Outline
 from matplotlib.text import Text
-from shapely import MultiPolygon, Polygon
-from shapely.geometry.base import BaseGeometry
 
-from oxbow.arrays import Place
-from oxbow.errors import InvalidMission, InvalidOption
+from oxbow.errors import InvalidOption
 from oxbow.mission.files import write_atomically
 from oxbow.site.site import Site
-from oxbow_certificate.erosion import eroded_water
 from oxbow_cli.interrupts import ending
 
 __all__ = [
-    "GAP",
     "INK",
     "LAND",
-    "WATER",
     "add_key",
     "area_text",
     "checked_format",
     "distance_text",
-    "draw_disc",
-    "draw_ends",
     "draw_header",
     "draw_scale_and_north",
-    "draw_site",
-    "labelled_area",
-    "lettering",
-    "line_width",
     "new_sheet",
-    "note",
-    "patch",
     "save_sheet",
 ]
 
 FORMATS = {".png": "png", ".svg": "svg"}
 
-LAND, WATER, MARGIN, SHORE, INK = "#f4f0e6", "#d3e6ef", "#e6f0f3", "#7d8f96", "#24343b"
-FORBIDDEN, FORBIDDEN_EDGE, GAP = "#e8d8c3", "#b5805a", "#c8322b"
+LAND, INK = "#f4f0e6", "#24343b"
+
 _DPI = 200
 _HEADER_IN, _FOOTER_IN = 0.85, 0.75
-_TOGETHER_M = 1.0
-"""Ends of paths nearer to each other than this are drawn as one."""
 _HEADER_END = 0.94
 """Where the north arrow begins, as a fraction of the sheet's width."""
 _SMALLEST_PT = 8.0
 _MOST_CHARACTERS = 400
-_FALLBACK_FONTS = (
-    "Noto Sans",
-    "Noto Sans CJK SC",
-    "Noto Sans CJK JP",
-    "Noto Sans Arabic",
-    "Noto Sans Devanagari",
-    "Droid Sans Fallback",
-    "WenQuanYi Zen Hei",
-    "Microsoft YaHei",
-    "Hiragino Sans",
-    "Arial Unicode MS",
-)
-_MISSING_GLYPH = re.compile(r"Glyph (\d+) .* missing from ")
-_log = logging.getLogger(__name__)
-_HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
 
 
 def checked_format(path: Path, width_px: int) -> str:
@@ -153,120 +114,6 @@ def new_sheet(site: Site) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def draw_site(axes: Axes, site: Site, safety_m: float) -> None:
-    """Draw land, zones, water within the safety distance, and the rest of the water.
-
-    Parameters
-    ----------
-    axes
-        The map.
-    site
-        What is drawn.
-    safety_m
-        The safety distance.
-
-    Raises
-    ------
-    InvalidMission
-        The zones leave no water.
-    """
-    water = site.outline.difference(shapely.union_all(site.zones))
-    if not isinstance(water, Polygon | MultiPolygon):
-        raise InvalidMission("leaves no water within the outline", where="ForbiddenZones")
-    pixel_m = (axes.get_xlim()[1] - axes.get_xlim()[0]) / 2000
-    axes.add_patch(patch(site.outline, facecolor=FORBIDDEN, edgecolor="none", zorder=1))
-    axes.add_patch(
-        patch(
-            shapely.union_all(site.zones).intersection(site.outline),
-            facecolor="none",
-            edgecolor=FORBIDDEN_EDGE,
-            hatch="//////",
-            linewidth=0,
-            zorder=1.5,
-        )
-    )
-    axes.add_patch(patch(water, facecolor=MARGIN, edgecolor=SHORE, linewidth=0.7, zorder=2))
-    axes.add_patch(patch(eroded_water(water, safety_m, pixel_m / 4), facecolor=WATER, edgecolor="none", zorder=3))
-
-
-def patch(geometry: BaseGeometry, **style: object) -> PathPatch:
-    """Polygons with their holes as one patch; `style` is that of `PathPatch`."""
-    polygons = [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon)]
-    rings = [ring for polygon in polygons for ring in (polygon.exterior, *polygon.interiors)]
-    # One compound path, not polygons over polygons: a hole must show what is below, not the colour of land.
-    outlines = [Outline(shapely.get_coordinates(ring), closed=True) for ring in rings if not ring.is_empty]
-    return PathPatch(Outline.make_compound_path(*outlines), **style)
-
-
-def draw_ends(axes: Axes, site: Site) -> None:
-    """Draw the launch and recovery points, and those that a vehicle has of its own.
-
-    Parameters
-    ----------
-    axes
-        The map.
-    site
-        The site.
-    """
-    drawn: list[Place] = []
-    for place, marker, label in _ends(site):
-        if any(math.dist(place, other) < _TOGETHER_M for other in drawn):
-            continue
-        drawn.append(place)
-        axes.plot(
-            *place, marker=marker, markersize=7, color="white", markeredgecolor=INK, markeredgewidth=1.6, zorder=7
-        )
-        note(axes, place, label, colour=INK)
-
-
-def _ends(site: Site) -> Iterator[tuple[Place, str, str]]:
-    """Where paths may start and end: place, marker and label, the mission's own first."""
-    pairs = [("", site.launch, site.recovery)]
-    vehicles = [member.vehicle for member in site.members if member.is_named]
-    pairs += [(f"{vehicle.name}: ", vehicle.start, vehicle.recovery) for vehicle in vehicles]
-    for name, launch, recovery in pairs:
-        together = math.dist(launch, recovery) < _TOGETHER_M
-        yield launch, "o", f"{name}launch and recovery" if together else f"{name}launch"
-        yield recovery, "s", f"{name}recovery"
-
-
-def note(axes: Axes, place: Place, text: str, *, colour: str) -> None:
-    """Write a label beside a place, on the side that has room.
-
-    Parameters
-    ----------
-    axes
-        The map.
-    place
-        What is labelled, in metres.
-    text
-        Plain text.
-    colour
-        Of the text.
-    """
-    west, east = axes.get_xlim()
-    right = place[0] < west + 0.8 * (east - west)
-    axes.annotate(
-        text,
-        place,
-        xytext=(7 if right else -7, 5),
-        textcoords="offset points",
-        ha="left" if right else "right",
-        fontsize=8,
-        color=colour,
-        path_effects=_HALO,
-        parse_math=False,
-        zorder=8,
-    )
-
-
-def labelled_area(axes: Axes) -> BaseGeometry:
-    """The area that the labels on a map cover, in metres of the map."""
-    to_data = axes.transData.inverted()
-    corners = [to_data.transform(text.get_window_extent().get_points()) for text in axes.texts]
-    return shapely.union_all([shapely.box(*low, *high) for low, high in corners])
-
-
 def draw_scale_and_north(axes: Axes) -> None:
     """Draw a scale bar of a round length below the map, and a north arrow above it."""
     (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
@@ -299,43 +146,6 @@ def draw_scale_and_north(axes: Axes) -> None:
         color=INK,
         fontsize=10,
         arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 1.4},
-    )
-
-
-def line_width(axes: Axes, spacing_m: float) -> float:
-    """The width of a line that keeps legs apart, in points; within limits that can be seen.
-
-    Parameters
-    ----------
-    axes
-        The map.
-    spacing_m
-        The spacing of legs.
-
-    Returns
-    -------
-    float
-        In points, from 0.35 to 1.6.
-    """
-    west, east = axes.get_xlim()
-    points_per_m = axes.figure.get_window_extent().width / axes.figure.dpi * 72 / (east - west)
-    return min(max(0.3 * spacing_m * points_per_m, 0.35), 1.6)
-
-
-def draw_disc(axes: Axes, place: Place, radius_m: float) -> None:
-    """Draw the disc that fits in a gap.
-
-    Parameters
-    ----------
-    axes
-        The map.
-    place
-        Its centre, in metres.
-    radius_m
-        Its radius.
-    """
-    axes.add_patch(
-        Circle(place, radius_m, facecolor="none", edgecolor=GAP, linewidth=1.1, linestyle=(0, (3, 2)), zorder=6)
     )
 
 
@@ -400,24 +210,6 @@ def _fit(figure: Figure, text: Text) -> None:
     while (width := text.get_window_extent().width) > room and shown > 1:
         shown = max(1, int(min(shown, len(text.get_text()) - 1) * room / width))
         text.set_text(f"{whole[:shown].rstrip()}…")
-
-
-@contextmanager
-def lettering() -> Iterator[None]:
-    """Within this context, text is drawn in fonts that have its characters; a note names those without any."""
-    installed = set(font_manager.get_font_names())
-    families = [*rcParams["font.sans-serif"][:1], *(name for name in _FALLBACK_FONTS if name in installed)]
-    with warnings.catch_warnings(record=True) as caught, rc_context({"font.family": families}):
-        warnings.simplefilter("always")
-        yield
-    missing = set()
-    for warning in caught:
-        if match := _MISSING_GLYPH.match(str(warning.message)):
-            missing.add(chr(int(match[1])))
-        else:
-            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    if missing:
-        _log.warning("note: no installed font has %s: drawn as boxes", "".join(sorted(missing)))
 
 
 def _round_down(length_m: float) -> float:

@@ -19,8 +19,9 @@ from oxbow_mission.database import Database
 from oxbow_mission.planner import Planner
 from oxbow_mission.registry import Registry
 from oxbow_mission.reports import Reports
+from oxbow_mission.schema import SCHEMA
 from oxbow_mission.service import MissionService
-from oxbow_mission.store import SCHEMA, Store
+from oxbow_mission.store import Store
 from oxbow_mission.vitals import Vitals
 
 _log = logging.getLogger("oxbow_mission")

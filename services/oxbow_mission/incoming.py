@@ -12,7 +12,7 @@ from oxbow.contracts import MissionKey, MissionStatus, mission_key
 from oxbow.errors import ErrorReply, OxbowError
 from oxbow_mission.checks import Incoming
 from oxbow_mission.registry import Registry
-from oxbow_mission.store import Request
+from oxbow_mission.revision import Request
 from oxbow_mission.waiters import Waiter, Waiters
 from oxbow_mission.wire import Check, Checked
 

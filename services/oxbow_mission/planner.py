@@ -20,11 +20,14 @@ from oxbow.runtime.closing import Closing
 from oxbow_mission.fair import Turns
 from oxbow_mission.helper import Helper, HelperDied, Helpers
 from oxbow_mission.registry import Registry
-from oxbow_mission.store import MAX_ATTEMPTS, QueuedMission
+from oxbow_mission.revision import QueuedMission
 from oxbow_mission.vitals import Vitals
 from oxbow_mission.wire import STAGE, Answer, Ask, Plan, Planned, Show
 
 __all__ = ["Planner"]
+
+MAX_ATTEMPTS = 3
+"""A revision fails after this many planner processes died of it."""
 
 GRACE_S = 5.0
 """How much longer than the deadline a run may take, so that a stage's own words about it arrive."""

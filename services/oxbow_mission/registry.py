@@ -20,7 +20,8 @@ from oxbow.contracts import MissionKey, MissionState, MissionStatus, mission_key
 from oxbow.errors import Cancelled, ErrorReply, Internal, InvalidRequest, OxbowError
 from oxbow.runtime.closing import Closing
 from oxbow_mission.fair import Order
-from oxbow_mission.store import QueuedMission, Request, Revision, Store
+from oxbow_mission.revision import QueuedMission, Request, Revision
+from oxbow_mission.store import Store
 
 __all__ = ["Registry"]
 

@@ -29,7 +29,7 @@ from oxbow_mission.checks import Checks
 from oxbow_mission.incoming import PutRequest, QueriedPlan, QueriedRequest
 from oxbow_mission.registry import Registry
 from oxbow_mission.reports import Reports
-from oxbow_mission.store import Revision
+from oxbow_mission.revision import Revision
 from oxbow_mission.waiters import MOST, Waiter, Waiters
 
 __all__ = ["MissionService"]

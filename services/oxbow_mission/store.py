@@ -10,55 +10,15 @@ import logging
 import sqlite3
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 import msgspec
 
 from oxbow.contracts import MissionState, MissionStatus, checked_id
 from oxbow.errors import ErrorCode, ErrorReply, Internal, InvalidRequest, OxbowError
-from oxbow_mission.database import Database, Schema
+from oxbow_mission.database import Database
+from oxbow_mission.revision import QueuedMission, Request, Revision
 
-__all__ = ["SCHEMA", "QueuedMission", "Request", "Revision", "Store"]
-
-MAX_ATTEMPTS = 3
-"""A revision fails after this many planner processes died of it."""
-
-SCHEMA = Schema(
-    version=2,
-    script="""
-CREATE TABLE revision (
-    mission_id TEXT NOT NULL,
-    revision INTEGER NOT NULL,
-    client TEXT NOT NULL DEFAULT '',
-    state TEXT NOT NULL,
-    attempts INTEGER NOT NULL DEFAULT 0,
-    announced INTEGER NOT NULL DEFAULT FALSE,
-    error TEXT,
-    changed_s REAL NOT NULL,
-    accepted_s REAL NOT NULL,
-    fingerprint TEXT NOT NULL,
-    parameters BLOB NOT NULL,
-    document BLOB NOT NULL,
-    plan BLOB,
-    PRIMARY KEY (mission_id, revision)
-) STRICT;
-CREATE INDEX unannounced ON revision (state) WHERE NOT announced;
-CREATE TABLE report (
-    mission_id TEXT NOT NULL,
-    received_s REAL NOT NULL,
-    payload BLOB NOT NULL
-) STRICT;
-CREATE INDEX report_of_mission ON report (mission_id);
-""",
-    upgrades={
-        # Schema 1 kept refused requests as revisions, which were none; and counted deaths of the whole service.
-        1: """
-DELETE FROM revision WHERE state = 'failed' AND length(document) = 0;
-ALTER TABLE revision ADD COLUMN client TEXT NOT NULL DEFAULT '';
-UPDATE revision SET attempts = 0;
-""",
-    },
-)
+__all__ = ["Store"]
 
 _log = logging.getLogger(__name__)
 
@@ -74,39 +34,6 @@ state = 'accepted' AND NOT announced AND NOT EXISTS (
     AND NOT earlier.announced
 )
 """
-
-
-@dataclass(frozen=True)
-class Request:
-    """What is asked for one mission, in JSON; requests with the same `fingerprint` ask for the same plan."""
-
-    document: bytes
-    parameters: bytes
-    fingerprint: str
-
-
-@dataclass(frozen=True)
-class Revision:
-    """Which revision of which mission; `number` counts from 1."""
-
-    mission_id: str
-    number: int
-
-    @classmethod
-    def of(cls, status: MissionStatus) -> Revision:
-        return cls(status.mission_id, status.revision)
-
-    def __str__(self) -> str:
-        return f"mission {self.mission_id}, revision {self.number}"
-
-
-@dataclass(frozen=True)
-class QueuedMission:
-    """A revision claimed for planning, and whose it is."""
-
-    revision: Revision
-    request: Request
-    client: str = ""
 
 
 class Store:

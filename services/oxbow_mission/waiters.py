@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from oxbow.bus.query import Query
 from oxbow.contracts import PLAN_KEY, MissionStatus
 from oxbow.errors import Busy, DeadlineExceeded, ErrorReply, OxbowError
-from oxbow_mission.store import Revision, Store
+from oxbow_mission.revision import Revision
+from oxbow_mission.store import Store
 from oxbow_mission.wire import STAGE
 
 __all__ = ["Waiter", "Waiters"]

@@ -7,7 +7,7 @@ import pytest
 
 from oxbow.mission.file import read_mission
 from oxbow.site.site import Site
-from oxbow_cli import sheet
+from oxbow_cli import chart, sheet
 from oxbow_cli.picture import DANGER
 from tests.support.project import EXAMPLES
 
@@ -76,5 +76,5 @@ def test_all_paths_are_drawn_with_their_names(oxbow, folder):
 def test_the_start_that_a_vehicle_has_to_itself_is_drawn():
     site = Site.of(read_mission(FLEET))
     _, axes = sheet.new_sheet(site)
-    sheet.draw_ends(axes, site)
+    chart.draw_ends(axes, site)
     assert [text.get_text() for text in axes.texts] == ["launch and recovery", "coot: launch and recovery"]

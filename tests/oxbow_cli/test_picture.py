@@ -13,7 +13,7 @@ from oxbow.mission.file import mission_json, parse_mission, read_mission
 from oxbow.mission.plan import FleetRecord, PlanOptions, VehicleRecord
 from oxbow.planning.pipeline import plan_mission
 from oxbow.site.site import Site
-from oxbow_cli import sheet
+from oxbow_cli import chart, sheet
 from oxbow_cli.gaps import draw_gaps
 from oxbow_cli.local import local_call
 from oxbow_cli.picture import draw
@@ -95,8 +95,8 @@ def test_a_name_is_plain_text(planned, tmp_path):
 
 def test_labels_cover_the_place_where_they_are_written():
     _, axes = sheet.new_sheet(Site.of(SITE))
-    sheet.note(axes, (0.0, 0.0), "a label of some length", colour="black")
-    west, south, east, north = sheet.labelled_area(axes).bounds
+    chart.note(axes, (0.0, 0.0), "a label of some length", colour="black")
+    west, south, east, north = chart.labelled_area(axes).bounds
     assert 0 < west < 0.1 * (east - west), "to the right of its place"
     assert 0 < north - south < 0.2 * (east - west)
 

@@ -22,7 +22,9 @@ from oxbow.contracts import MissionState, MissionStatus
 from oxbow.errors import Internal, Unavailable
 from oxbow.mission.file import parse_mission
 from oxbow_mission.database import Database
-from oxbow_mission.store import SCHEMA, Request, Store
+from oxbow_mission.revision import Request
+from oxbow_mission.schema import SCHEMA
+from oxbow_mission.store import Store
 from tests.support.mission_files import INFEASIBLE_SEED, POISON_SEED, listening, mission_file, revision_of
 
 pytestmark = pytest.mark.processes

@@ -12,7 +12,9 @@ import pytest
 
 from oxbow.errors import Internal, Unavailable
 from oxbow_mission.database import Database
-from oxbow_mission.store import SCHEMA, Request, Store
+from oxbow_mission.revision import Request
+from oxbow_mission.schema import SCHEMA
+from oxbow_mission.store import Store
 
 REQUEST = Request(document=b"a", parameters=b"{}", fingerprint="print of a")
 

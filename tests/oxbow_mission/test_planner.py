@@ -15,9 +15,11 @@ from oxbow.errors import ErrorCode
 from oxbow.planning.submission import SubmissionParameters
 from oxbow_mission import planner as bounds
 from oxbow_mission.database import Database
-from oxbow_mission.planner import Planner
+from oxbow_mission.planner import MAX_ATTEMPTS, Planner
 from oxbow_mission.registry import Registry
-from oxbow_mission.store import MAX_ATTEMPTS, SCHEMA, Request, Revision, Store
+from oxbow_mission.revision import Request, Revision
+from oxbow_mission.schema import SCHEMA
+from oxbow_mission.store import Store
 from oxbow_mission.vitals import Vitals
 from tests.support.mission_processes import STAGES, end, launch
 from tests.support.project import ROOT

@@ -11,7 +11,9 @@ from oxbow.errors import InvalidRequest
 from oxbow_mission import reports as bounds
 from oxbow_mission.database import Database
 from oxbow_mission.reports import Reports
-from oxbow_mission.store import SCHEMA, Request, Store
+from oxbow_mission.revision import Request
+from oxbow_mission.schema import SCHEMA
+from oxbow_mission.store import Store
 
 REQUEST = Request(document=b"a", parameters=b"{}", fingerprint="print of a")
 

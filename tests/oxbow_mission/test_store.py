@@ -16,7 +16,9 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from oxbow.contracts import MissionState
 from oxbow.errors import Infeasible, Internal, InvalidMission, InvalidRequest, OxbowError, Unavailable
 from oxbow_mission.database import Database
-from oxbow_mission.store import SCHEMA, QueuedMission, Request, Revision, Store
+from oxbow_mission.revision import QueuedMission, Request, Revision
+from oxbow_mission.schema import SCHEMA
+from oxbow_mission.store import Store
 
 
 def request(content: str) -> Request:

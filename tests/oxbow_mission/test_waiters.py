@@ -13,7 +13,7 @@ from oxbow.bus.client import Bus
 from oxbow.bus.query import Query
 from oxbow.errors import Busy, DeadlineExceeded, Unavailable
 from oxbow_mission import waiters as bounds
-from oxbow_mission.store import Revision
+from oxbow_mission.revision import Revision
 from oxbow_mission.waiters import Waiter, Waiters
 
 pytestmark = pytest.mark.processes

@@ -11,7 +11,8 @@ import msgspec
 import zenoh
 
 from oxbow.bus.replicas import Replicas
-from oxbow.bus.session import Session, error_of, error_of_reply, is_timeout
+from oxbow.bus.replies import error_of, error_of_reply, is_timeout
+from oxbow.bus.session import Session
 from oxbow.contracts import ANY_LIVE, MAX_REQUEST_BYTES, Endpoint, Message, live_service
 from oxbow.errors import Busy, DeadlineExceeded, ErrorCode, Internal, InvalidRequest, OxbowError, Unavailable
 from oxbow.ids import MOST_ID_CHARACTERS
@@ -74,7 +75,7 @@ class Bus(Session):
 
         Raises
         ------
-        InvalidRequest
+        InvalidOption
             `timeout_s` is no wait (`oxbow.wire.waits`).
         Unavailable
             Some have none after `timeout_s`; the message names them.
@@ -255,7 +256,7 @@ class _Attempts(Generic[A]):
         # Longer than the deadline, so that the stage itself reports where the time went.
         timeout_s = max(0.0, self.envelope.remaining_s()) + REPLY_GRACE_S
         # The key is that of one replica: the first reply is the only one.
-        for reply in self.bus._get(key, self.payload, attachment=self.attachment, timeout_s=timeout_s):
+        for reply in self.bus.questions.ask(key, self.payload, attachment=self.attachment, timeout_s=timeout_s):
             if reply.ok is not None:
                 return self._answer(reply.ok, key)
             if reply.err is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from types import TracebackType
 from typing import Self
 from urllib.parse import unquote
@@ -9,12 +10,14 @@ from urllib.parse import unquote
 import msgspec
 import zenoh
 
-from oxbow.errors import ErrorReply
+from oxbow.errors import ErrorReply, Internal, error_text
 
 __all__ = ["JSON", "MSGPACK", "Query"]
 
 JSON = "application/json"
 MSGPACK = "application/msgpack"
+
+_log = logging.getLogger(__name__)
 
 
 class Query:
@@ -65,6 +68,19 @@ class Query:
     def fail(self, error: ErrorReply) -> None:
         """Reply an error; its JSON encoding distinguishes it from zenoh's own."""
         self._query.reply_err(msgspec.json.encode(error), encoding=JSON)
+
+    def fail_of(self, error: BaseException, where: str) -> None:
+        """Log an exception that nobody expected, and reply it as `internal`.
+
+        Parameters
+        ----------
+        error
+            What was raised on the way to an answer.
+        where
+            The keys that are answered for.
+        """
+        _log.error("%s: no answer", where, exc_info=error)
+        self.fail(ErrorReply.of(Internal(error_text(error), where=where)))
 
     def __enter__(self) -> Self:
         return self

@@ -10,41 +10,26 @@ import atexit
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from typing import Self
 
 import zenoh
 from zenoh.handlers import Callback
 
 from oxbow.bus.config import DEFAULT_ENDPOINT, client_config
+from oxbow.bus.keys import require_key
 from oxbow.bus.mailbox import Mailbox
 from oxbow.bus.query import JSON, Query
+from oxbow.bus.questions import Questions
+from oxbow.bus.replies import error_of
 from oxbow.bus.subscription import Audience, Declared, OnQuery, OnSample, Subscription
-from oxbow.errors import (
-    Busy,
-    DeadlineExceeded,
-    ErrorCode,
-    ErrorReply,
-    Internal,
-    InvalidRequest,
-    OxbowError,
-    Unavailable,
-    error_text,
-)
-from oxbow.ids import excerpt
+from oxbow.errors import Busy, ErrorReply, OxbowError, Unavailable
 from oxbow.runtime.closing import Closing
-from oxbow.wire.envelope import StageError
-from oxbow.wire.strict_json import decode_json
 from oxbow.wire.waits import checked_wait
 
-__all__ = ["MOST_KEY_BYTES", "Session", "error_of", "error_of_reply", "is_timeout"]
-
-MOST_KEY_BYTES = 4096
-"""The key of an id of 128 characters, percent-encoded, is far shorter."""
+__all__ = ["Session"]
 
 OPEN_ATTEMPT_S = 1.0
-LINK_LOSS_S = 0.1
-"""How long after the loss of the link to the router a query may still leave over it, unnoticed."""
 
 _log = logging.getLogger(__name__)
 
@@ -60,6 +45,8 @@ class Session(Closing):
     ----------
     links
         How often a link to the router came up: what was put between two links was not heard.
+    questions
+        What is asked, for callers that take replies as they come; see `query`.
     """
 
     def __init__(self, session: zenoh.Session, endpoint: str) -> None:
@@ -69,7 +56,7 @@ class Session(Closing):
         self._lock = threading.Lock()
         self._subscriptions: list[Subscription] = []
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
-        self._asking: set[zenoh.CancellationToken] = set()
+        self.questions = Questions(session)
         session.info.declare_transport_events_listener(Callback(self._on_transport, indirect=False))
         # At exit, zenoh must not call back into an interpreter that is gone.
         atexit.register(session.close)
@@ -92,7 +79,7 @@ class Session(Closing):
 
         Raises
         ------
-        InvalidRequest
+        InvalidOption
             The endpoint is not valid, or `timeout_s` is no wait (`oxbow.wire.waits`).
         Unavailable
             Nothing answered at `endpoint` within `timeout_s`.
@@ -256,7 +243,7 @@ class Session(Closing):
                 except OxbowError as error:
                     query.fail(ErrorReply.of(error))
                 except BaseException as error:  # noqa: BLE001 - becomes an `internal` reply
-                    _fail(query, error, keys[0])
+                    query.fail_of(error, keys[0])
 
         mailbox = Mailbox[Query](f"answer {keys[0]}", deliver, size=queue_size, workers=workers)
 
@@ -292,7 +279,7 @@ class Session(Closing):
                 accept(query)
             except BaseException as error:  # noqa: BLE001 - zenoh would drop the query without a word
                 with query:
-                    _fail(query, error, key)
+                    query.fail_of(error, key)
 
         return self._session.declare_queryable(key, Callback(wrap, indirect=False))
 
@@ -332,13 +319,15 @@ class Session(Closing):
         ------
         OxbowError
             The error that was replied; `DeadlineExceeded` after `timeout_s`; `Unavailable` where nobody answered;
-            `InvalidRequest` where the selector is not valid, or `timeout_s` is no wait (`oxbow.wire.waits`).
+            `InvalidRequest` where the selector is not valid; `InvalidOption` where `timeout_s` is no wait
+            (`oxbow.wire.waits`).
         """
         found: list[tuple[str, bytes]] = []
         failure: OxbowError | None = None
-        for reply in self._get(
+        replies = self.questions.ask(
             selector, payload, timeout_s=timeout_s, attachment=attachment, all_targets=all_targets
-        ):
+        )
+        for reply in replies:
             if reply.ok is not None:
                 found.append((str(reply.ok.key_expr), reply.ok.payload.to_bytes()))
             elif reply.err is not None:
@@ -376,51 +365,11 @@ class Session(Closing):
 
         self._session.liveliness().declare_subscriber(key_expr, Callback(accept, indirect=False), history=True)
 
-    def _get(
-        self,
-        selector: str,
-        payload: bytes,
-        *,
-        timeout_s: float,
-        all_targets: bool = False,
-        attachment: bytes | None = None,
-    ) -> Iterator[zenoh.Reply]:
-        require_key(selector.partition("?")[0])
-        checked_wait(timeout_s, "timeout_s")
-        target = zenoh.QueryTarget.ALL if all_targets else zenoh.QueryTarget.BEST_MATCHING
-        cancellation = zenoh.CancellationToken()
-        self._asking.add(cancellation)
-        try:
-            yield from self._session.get(
-                selector,
-                payload=payload,
-                attachment=attachment,
-                timeout=timeout_s,
-                target=target,
-                # Every reply counts, and the first is of use before the last: none is held back to be merged.
-                consolidation=zenoh.ConsolidationMode.NONE,
-                cancellation_token=cancellation,
-            )
-        except zenoh.ZError as error:
-            if not cancellation.is_cancelled:
-                raise Unavailable(f"cannot ask: {error}", where=selector) from error
-        finally:
-            self._asking.discard(cancellation)
-
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         if event.kind == zenoh.SampleKind.PUT:
             self.links += 1
         if event.kind == zenoh.SampleKind.DELETE:
-            # On another thread: this one is zenoh's, and must not wait.
-            give_up = threading.Timer(LINK_LOSS_S, self._give_up_asking)
-            give_up.daemon = True
-            give_up.start()
-
-    def _give_up_asking(self) -> None:
-        """End what was asked before the link was lost: zenoh forgets queries that leave at that very moment."""
-        # A copy: other threads ask, and end asking, meanwhile.
-        for cancellation in tuple(self._asking):
-            cancellation.cancel()
+            self.questions.give_up_soon()
 
     def _keep(self, subscription: Subscription) -> Subscription:
         with self._lock:
@@ -428,75 +377,3 @@ class Session(Closing):
             # them.
             self._subscriptions = [kept for kept in self._subscriptions if not kept.closed] + [subscription]
         return subscription
-
-
-def require_key(key: str) -> None:
-    """Refuse a key at which zenoh would panic, and take the whole session with it.
-
-    Raises
-    ------
-    InvalidRequest
-        It is longer than `MOST_KEY_BYTES`, or is not Unicode.
-    """
-    # A lone surrogate cannot be encoded: let through to be counted, and refused below with a message.
-    size = len(key.encode(errors="surrogatepass"))
-    if size > MOST_KEY_BYTES or any("\ud800" <= character <= "\udfff" for character in key):
-        raise InvalidRequest(
-            f"is {excerpt(key)}, {size} bytes; expected at most {MOST_KEY_BYTES} bytes of Unicode", where="key"
-        )
-
-
-def error_of(reply: zenoh.ReplyError, selector: str, timeout_s: float) -> OxbowError:
-    """The exception that an error reply stands for.
-
-    Parameters
-    ----------
-    reply
-        Zenoh's time-out, or an error in JSON.
-    selector
-        What was asked, for errors.
-    timeout_s
-        How many seconds the answer was waited for, for errors.
-
-    Returns
-    -------
-    OxbowError
-        To be raised by the caller; `DeadlineExceeded` for zenoh's own time-out.
-    """
-    if is_timeout(reply):
-        return DeadlineExceeded(f"no answer within {timeout_s:.1f} s", where=selector)
-    return error_of_reply(reply, selector).error()
-
-
-def is_timeout(reply: zenoh.ReplyError) -> bool:
-    """Whether an error is zenoh's own, which is plain text; of these, only the time-out reaches a caller."""
-    return str(reply.encoding) != JSON
-
-
-def error_of_reply(reply: zenoh.ReplyError, selector: str) -> StageError:
-    """The error that was replied; one that cannot be read is `internal`.
-
-    Parameters
-    ----------
-    reply
-        An error in JSON.
-    selector
-        What was asked, which is where an unreadable error is said to have happened.
-
-    Returns
-    -------
-    StageError
-        With the code `internal` where the reply was no such error.
-    """
-    try:
-        return decode_json(reply.payload.to_bytes(), StageError, "error")
-    except InvalidRequest as error:
-        return StageError(
-            code=ErrorCode.INTERNAL, message=f"replied an error that cannot be read: {error}", where=selector
-        )
-
-
-def _fail(query: Query, error: BaseException, where: str) -> None:
-    """Answer a query that ended in an exception which nobody expected."""
-    _log.error("%s: no answer", where, exc_info=error)
-    query.fail(ErrorReply.of(Internal(error_text(error), where=where)))
