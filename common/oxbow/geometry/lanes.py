@@ -10,11 +10,13 @@ from oxbow.arrays import FloatArray
 from oxbow.contracts import MiddleLine
 from oxbow.tolerances import HAIR_M
 
-__all__ = ["OPENING", "lane", "lane_length_m"]
+__all__ = ["OPENING", "lane", "legs_length_m"]
 
 OPENING = 0.05
 """To each side, the ways out and home open by this share of the way to the free space: in a corner of the free
 space, where they part is outside of it."""
+SPARE = 1.001
+"""Legs are at most this many times as long as was computed: where they bend, they are drawn in steps."""
 
 
 def lane(middle: MiddleLine, apart_m: float) -> FloatArray:
@@ -47,21 +49,34 @@ def lane(middle: MiddleLine, apart_m: float) -> FloatArray:
     return np.vstack([place, berth + hair, afloat])
 
 
-def lane_length_m(middle: MiddleLine, apart_m: float) -> float:
-    """The length of the lane to the right of a middle line, and straight on to the gate.
+def legs_length_m(out: MiddleLine | None, home: MiddleLine | None, apart_m: float) -> float:
+    """How long the legs to a share and home may become, with the steps from and to the gate.
+
+    On either side, as far from their middle lines as they may be: nearer to these, their length is between.
+    A path between two legs is cut by the width of both, which is what the steps are longer by.
 
     Parameters
     ----------
-    middle
-        The middle line, from a place to a gate.
+    out, home
+        The middle lines, from a place to a gate; None for a leg that is not needed.
     apart_m
-        How far to its right the lane runs; to its left where negative.
+        How far legs may run beside their middle lines.
 
     Returns
     -------
     float
-        In metres, the step from the lane's end to the gate included.
+        In metres; 0 without legs. A leg alone follows its middle line.
     """
+    if out is None or home is None:
+        return sum((leg.line.length for leg in (out, home) if leg is not None), 0.0)
+    beside_m = (
+        _lane_length_m(out, side * apart_m) + _lane_length_m(home, -side * apart_m) for side in (1.0, -1.0)
+    )
+    return SPARE * max(out.line.length + home.line.length, *beside_m)
+
+
+def _lane_length_m(middle: MiddleLine, apart_m: float) -> float:
+    """The length of the lane to the right of a middle line, and straight on to the gate."""
     gate = shapely.get_coordinates(middle.line)[-1:]
     return LineString(np.vstack([lane(middle, apart_m), gate])).length
 

@@ -6,13 +6,14 @@ request; and a path leaves only after it has been judged once more, on the missi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 import shapely
 from msgspec import structs
-from shapely import LineString, Polygon
+from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from oxbow.arrays import Place
@@ -36,11 +37,15 @@ from oxbow.contracts import (
     Message,
     PathPlan,
     PathRequest,
+    Role,
     Rule,
+    Share,
+    Vehicle,
 )
 from oxbow.errors import Internal
 from oxbow.geometry.conformance import SHORE_TOLERANCE_M, Shore, strays
 from oxbow.geometry.frame import Frame
+from oxbow.geometry.lanes import legs_length_m
 from oxbow.geometry.sweep import from_sweep
 from oxbow.site.fleet import VehiclePlan
 from oxbow.tolerances import DISTANCE_ROUNDING, ROUNDING_M
@@ -168,19 +173,68 @@ def _path_faults(request: PathRequest, reply: PathPlan) -> Iterator[str]:
 
 
 def _assignment_faults(request: AssignRequest, reply: Assignment) -> Iterator[str]:
+    yield from _share_faults(request, reply)
     vehicles = {vehicle.name: vehicle for vehicle in request.vehicles}
     spots = {spot.name for spot in request.hot_spots}
-    for share in reply.shares:
-        if share.vehicle not in vehicles:
-            yield f"a share is that of {share.vehicle!r}, which takes no part"
-        if not _are_in(shapely.get_coordinates(share.area), request.free):
-            yield f"the share of {share.vehicle!r} leaves the free space"
     for sortie in (*reply.sorties, *reply.further):
         vehicle = vehicles.get(sortie.vehicle)
         if vehicle is None or not spots.issuperset(sortie.hot_spots):
             yield f"a sortie of {sortie.vehicle!r} over {', '.join(sortie.hot_spots)} was not asked for"
         else:
             yield from _way_faults(sortie.path, vehicle.start, vehicle.recovery, vehicle.length_m)
+
+
+def _share_faults(request: AssignRequest, reply: Assignment) -> Iterator[str]:
+    masters = {vehicle.name: vehicle for vehicle in request.vehicles if vehicle.role is Role.MASTER}
+    asked = sorted(masters) if request.share_free else []
+    given = sorted(share.vehicle for share in reply.shares)
+    if given != asked:
+        yield f"shares are those of {', '.join(given) or 'nobody'}, not of {', '.join(asked) or 'nobody'}"
+        return
+    for share in reply.shares:
+        if not _are_in(shapely.get_coordinates(share.area), request.free):
+            yield f"the share of {share.vehicle!r} leaves the free space"
+        yield from _approach_faults(share, masters[share.vehicle], request.free)
+    if reply.shares:
+        yield from _division_faults(request, reply)
+
+
+def _division_faults(request: AssignRequest, reply: Assignment) -> Iterator[str]:
+    """Whether shares, with what is dropped, make up the free space, and none lies upon another."""
+    areas = [share.area for share in reply.shares]
+    shared_m2, covered_m2 = sum(area.area for area in areas), shapely.union_all(areas).area
+    dropped_m2 = sum(part.area_m2 for part in reply.dropped)
+    # Rounding moves rims by no more than places may differ.
+    exact_m2 = EXACT_M * sum(area.length for area in areas)
+    if shared_m2 - covered_m2 > exact_m2:
+        yield f"shares overlap by {shared_m2 - covered_m2:.3g} m2"
+    elif (missing_m2 := request.free.area - covered_m2 - dropped_m2) > exact_m2:
+        yield f"shares leave {missing_m2:.3g} m2 of the free space to nobody"
+
+
+def _approach_faults(share: Share, vehicle: Vehicle, free: Polygon) -> Iterator[str]:
+    """What is wrong with the ends and the length of the legs; where they run is judged with the path."""
+    approach, whose = share.approach, f"approach of {share.vehicle!r}"
+    for place, gate, leg in (
+        (vehicle.start, approach.launch, approach.out),
+        (vehicle.recovery, approach.recovery, approach.home),
+    ):
+        if leg is None:
+            begin_m, end_m = 0.0, math.dist(place, gate)
+            # From ashore, the way to the free space would have to be found again to know where it enters.
+            if free.contains(Point(place)) and not shapely.dwithin(share.area, Point(place), EXACT_M):
+                yield f"no leg leads {share.vehicle!r} from its place to its share"
+        else:
+            begin_m, end_m = map(math.dist, (leg.line.coords[0], leg.line.coords[-1]), (place, gate))
+            if not shapely.dwithin(share.area, Point(gate), EXACT_M):
+                yield f"the {whose} has a gate that is not at the share"
+        if max(begin_m, end_m) > EXACT_M:
+            yield f"the {whose} begins {begin_m:.3g} m from its place and ends {end_m:.3g} m from its gate"
+    legs_m = legs_length_m(approach.out, approach.home, approach.apart_m)
+    if not math.isclose(approach.legs_m, legs_m, rel_tol=DISTANCE_ROUNDING, abs_tol=EXACT_M):
+        yield f"the {whose} takes {approach.legs_m:.1f} m, but its legs {legs_m:.1f} m"
+    if legs_m >= vehicle.length_m:
+        yield f"the {whose} takes {legs_m:.1f} m, of {vehicle.length_m:.1f} m"
 
 
 def _certificate_faults(request: CertifyRequest, reply: Certificate) -> Iterator[str]:

@@ -21,7 +21,7 @@ from oxbow.arrays import FloatArray, Place
 from oxbow.contracts import Approach, MiddleLine, Share, Vehicle
 from oxbow.contracts.budget import too_short
 from oxbow.errors import Infeasible
-from oxbow.geometry.lanes import lane_length_m
+from oxbow.geometry.lanes import legs_length_m
 from oxbow.geometry.route import Landing, RouteMethod, Router, Routes, leg_routes, make_router, way_to
 from oxbow.tolerances import ON_SHORE_M, ROUNDING_M
 
@@ -37,8 +37,6 @@ NEAR_GATES = 10.0
 """The gates of the way out and home become one where they are within this many leg distances (`apart_m`)."""
 BESIDE = 0.15
 """Between a place and the free space, legs may run as far from the way as this share of it."""
-SPARE = 1.001
-"""Legs are at most this many times as long as was computed: where they bend, they are drawn in steps."""
 
 
 class Harbour:
@@ -105,7 +103,7 @@ class Harbour:
         out = None if start is None else self._middle_line(start.line, vehicle.start)
         home = None if recovery is None else self._middle_line(recovery.line, vehicle.recovery)
         apart_m = min(way.lanes.apart_m for way in used.values())
-        legs_m = _legs_m(out, home, apart_m)
+        legs_m = legs_length_m(out, home, apart_m)
         if legs_m >= vehicle.length_m:
             way_there = "the way to the vehicle's share and home"
             raise too_short(vehicle.length_m, legs_m, what=way_there, where=vehicle.field("length_m"))
@@ -248,15 +246,3 @@ def _edge_middles(area: BaseGeometry, most: int) -> FloatArray:
 
 def _polygons(area: BaseGeometry) -> tuple[Polygon, ...]:
     return tuple(part for part in shapely.get_parts(area) if isinstance(part, Polygon))
-
-
-def _legs_m(out: MiddleLine | None, home: MiddleLine | None, apart_m: float) -> float:
-    """How long the legs may become, with the steps from and to the gate.
-
-    On either side, as far from their middle lines as they may be: nearer to these, their length is between.
-    A path between two legs is cut by the width of both, which is what the steps are longer by.
-    """
-    if out is None or home is None:
-        return sum(leg.line.length for leg in (out, home) if leg is not None)
-    beside_m = (lane_length_m(out, side * apart_m) + lane_length_m(home, -side * apart_m) for side in (1.0, -1.0))
-    return SPARE * max(out.line.length + home.line.length, *beside_m)

@@ -71,6 +71,7 @@ class Calls:
         self.stages = []
         self.parts = []
         self.shares = {}
+        self.legs_m = {}
         self._call = local_call()
 
     def __call__(self, endpoint, request, /, *, part=""):
@@ -79,6 +80,7 @@ class Calls:
         self.parts.append(part)
         if endpoint is ASSIGN:
             self.shares |= {share.vehicle: share.area for share in reply.shares}
+            self.legs_m |= {share.vehicle: share.approach.legs_m for share in reply.shares}
         return reply
 
 
@@ -138,6 +140,25 @@ def test_masters_share_the_water_and_keep_to_their_shares(count):
         outside = shapely.get_parts(path.difference(calls.shares[name].buffer(0.01)))
         ends = shapely.MultiPoint([path.coords[0], path.coords[-1]])
         assert all(leg.distance(ends) < 0.1 for leg in outside if leg.length > 0.1)
+
+
+@pytest.mark.parametrize(("length_m", "is_far"), [(6_000.0, True), (9_000.0, False)])
+def test_a_way_to_a_share_that_takes_more_than_a_quarter_of_the_range_is_warned_about(length_m, is_far):
+    """Two boats begin at one end of a long narrow lake: one of them passes the other's share, out and home."""
+    canal = contour((0, 0), (1500, 0), (1500, 80), (0, 80))
+    boats_2 = boats("master", 2, Length=length_m)
+    given = mission("map", boats_2, None, BoundingBox=canal, ForbiddenZones=[], LaunchPoint=at(5, 40))
+    completed, calls = planned(given)
+    near, far = sorted(calls.legs_m, key=calls.legs_m.get)
+    outside_m = lines(completed)[far].difference(calls.shares[far].buffer(0.01)).length
+    assert calls.legs_m[near] == 0.0
+    assert calls.legs_m[far] == pytest.approx(outside_m, rel=0.02)
+    assert (outside_m > 0.25 * length_m) is is_far
+    warned = [text for text in completed.plan.warnings if "the way to its share" in text]
+    percent = round(100.0 * calls.legs_m[far] / length_m)
+    expected = f"{far}: the way to its share and home takes {percent}% of its {length_m:.0f} m: start it nearer"
+    assert len(warned) == is_far
+    assert all(text.startswith(expected) for text in warned)
 
 
 def test_shares_are_made_of_triangles_of_the_footprint():
