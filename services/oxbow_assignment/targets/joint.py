@@ -22,7 +22,7 @@ PATIENCE = 2_000
 PRECISION = 0.005
 """Bisection ends when the longest makespan not reached is within this fraction of the shortest one reached."""
 
-MISSING = "the optional extra `fleet` (PyVRP) is not installed: pip install 'oxbow[fleet]'"
+MISSING = "PyVRP, of the optional extra fleet, is not installed: pip install 'oxbow[fleet]'"
 NOT_ASKED = "the joint optimiser was not asked for"
 
 
