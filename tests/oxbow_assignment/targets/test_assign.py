@@ -286,7 +286,7 @@ def test_why_there_is_no_gap_is_told(monkeypatch):
     solution = joint.solve(scene)
     assert solution.best == solution.clustered.assignment
     assert solution.gap == joint.Gap(None, joint.MISSING)
-    with pytest.raises(Unavailable, match="extra `fleet`"):
+    with pytest.raises(Unavailable, match="optional extra fleet"):
         joint.optimise(scene)
 
 
