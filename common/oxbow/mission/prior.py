@@ -110,6 +110,10 @@ class PriorModel(msgspec.Struct, frozen=True, kw_only=True):
 
 # --------------------------------------------------------------------------- GeoJSON
 
+# Not the structs that `oxbow.site.geojson` reads with. A prior model is written again with all that it had: these
+# keep every member, and accept only the geometries that can have a weight or a value. An import takes any GeoJSON,
+# down to collections in collections and features without a geometry, and keeps the polygons and a name.
+
 
 class _CollectionKind(enum.StrEnum):
     FEATURE_COLLECTION = "FeatureCollection"

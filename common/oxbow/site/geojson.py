@@ -126,6 +126,14 @@ class _Area:
         return float(shapely.Polygon(shell).area * np.cos(np.radians(shell[0, 1])))
 
 
+@dataclass(frozen=True)
+class _Water:
+    """The area that is planned on, and notes on how the document was read."""
+
+    area: _Area
+    notes: tuple[str, ...]
+
+
 @about_mission()
 def mission_from_geojson(  # noqa: PLR0913 - one parameter for each field of the Mission File
     data: bytes,
@@ -166,16 +174,11 @@ def mission_from_geojson(  # noqa: PLR0913 - one parameter for each field of the
         The document is not such GeoJSON, holds several polygons and `part` does not choose one, is not in
         degrees, or the mission's geometry breaks a rule (`oxbow.site.site.Site.of`).
     """
-    geometries = list(_geometries(data))
-    given = [area for geometry in geometries for area in _areas(geometry)]
-    passed_over = Counter(geometry.kind for geometry in geometries if not _has_area(geometry))
-    # Areas first cut at the antimeridian are joined: their halves would be two waters.
-    areas = _joined(given)
-    area = _chosen(areas, part, passed_over)
-    outline, *holes = (_positions(ring) for ring in area.rings)
+    water = _water(data, part)
+    outline, *holes = (_positions(ring) for ring in water.area.rings)
     mission = Mission(
         mission_type=mission_type,
-        site_name=site_name or area.name,
+        site_name=site_name or water.area.name,
         launch=launch,
         recovery=recovery,
         outline=outline,
@@ -187,10 +190,7 @@ def mission_from_geojson(  # noqa: PLR0913 - one parameter for each field of the
     )
     # For its checks alone: what cannot be planned is refused now, while the author looks at the document.
     Site.of(mission)
-    notes = [f"passed over {_counted(passed_over)}: only polygons are water"] if passed_over else []
-    if area not in given:
-        notes.append(f"{area.place} were cut at the antimeridian: joined into one water")
-    return ImportedMission(mission, tuple(notes))
+    return ImportedMission(mission, water.notes)
 
 
 # --------------------------------------------------------------------------- the document
@@ -271,6 +271,19 @@ def _ring(place: str, points: list[list[float]]) -> FloatArray:
 
 
 # --------------------------------------------------------------------------- which water
+
+
+def _water(data: bytes, part: int | None) -> _Water:
+    """The water that a document describes, or its part of that number."""
+    geometries = list(_geometries(data))
+    given = [area for geometry in geometries for area in _areas(geometry)]
+    passed_over = Counter(geometry.kind for geometry in geometries if not _has_area(geometry))
+    # Areas first cut at the antimeridian are joined: their halves would be two waters.
+    area = _chosen(_joined(given), part, passed_over)
+    notes = [f"passed over {_counted(passed_over)}: only polygons are water"] if passed_over else []
+    if area not in given:
+        notes.append(f"{area.place} were cut at the antimeridian: joined into one water")
+    return _Water(area, tuple(notes))
 
 
 def _joined(areas: Sequence[_Area]) -> list[_Area]:
