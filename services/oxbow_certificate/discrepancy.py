@@ -8,15 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from scipy.stats import qmc
 from shapely import LineString, MultiPolygon
 
 from oxbow.arrays import FloatArray
 from oxbow_certificate.axes import Paths, coordinates_along, long_side
 
-__all__ = ["Discrepancy", "discrepancy", "unit_square"]
+__all__ = ["Discrepancy", "centred_discrepancy", "discrepancy", "unit_square"]
 
 _MOST_POSITIONS = 4_000
+_CHUNK = 512
 _GOLDEN_RATIO = (1 + math.sqrt(5)) / 2
 
 
@@ -69,10 +69,59 @@ def discrepancy(region: MultiPolygon, paths: Paths, spacing_m: float, tolerance_
     square = unit_square(upright, coordinates_along(positions, along))
     if not len(square):
         return None
-    squared = float(qmc.discrepancy(square, method="CD"))
+    squared = centred_discrepancy(square)
     # The mean of the kernel prod(1 + |x - 1/2|) less that over independent pairs: (5/4)^2 - (13/12)^2.
     expected = 7 / 18 / len(square)
     return Discrepancy(math.sqrt(squared), math.sqrt(squared / expected))
+
+
+def centred_discrepancy(square: FloatArray) -> float:
+    """The squared centred L2 discrepancy of places in the unit square (Hickernell 1998).
+
+    That of `scipy.stats.qmc.discrepancy`, in less time. For two coordinates on one side of the middle, the factor
+    1 + (|x - 1/2| + |y - 1/2| - |x - y|) / 2 of the double sum is 1 + min(|x - 1/2|, |y - 1/2|), and otherwise it
+    is 1. The product over both axes is thus a sum of four terms: of these, only that of both minima is a sum over
+    pairs, and only over those within a quadrant.
+
+    Parameters
+    ----------
+    square
+        Places, shape (n, 2), n > 0, each coordinate in [0, 1].
+
+    Returns
+    -------
+    float
+        At least 0, but for rounding.
+    """
+    count = len(square)
+    off = np.abs(square - 0.5)
+    side = (square > 0.5) @ np.array([1, 2])
+    pairs = float(count**2)
+    for axis in (0, 1):
+        for here in (side & (1 << axis) == 0, side & (1 << axis) != 0):
+            pairs += _sum_of_minima(off[here, axis])
+    for quadrant in range(4):
+        pairs += _sum_of_products_of_minima(off[side == quadrant])
+    single = float(np.sum(np.prod(1.0 + off / 2 - off**2 / 2, axis=1)))
+    return (13 / 12) ** 2 - 2 * single / count + pairs / count**2
+
+
+def _sum_of_minima(values: FloatArray) -> float:
+    """The sum of min(a, b) over all ordered pairs of values, those of a value with itself included."""
+    # The k-th largest is the lesser one of 2 k + 1 pairs.
+    return float(np.sort(values)[::-1] @ (2 * np.arange(len(values)) + 1))
+
+
+def _sum_of_products_of_minima(values: FloatArray) -> float:
+    """The sum of min(a0, b0) min(a1, b1) over all ordered pairs of rows of `values` (n, 2)."""
+    # From the largest first column on, the later row of a pair has the lesser one.
+    first, second = values[np.argsort(-values[:, 0])].T
+    total = float(first @ second)
+    for start in range(0, len(values), _CHUNK):
+        rows = slice(start, start + _CHUNK)
+        lesser = np.minimum(second[rows, None], second[: start + _CHUNK])
+        total += 2.0 * float(first[rows] @ np.tril(lesser, start - 1).sum(axis=1))
+    return total
 
 
 def unit_square(region: MultiPolygon, places: FloatArray) -> FloatArray:

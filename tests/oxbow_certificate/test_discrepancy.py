@@ -8,7 +8,7 @@ from scipy.stats import qmc
 from shapely import LineString, MultiPolygon, Point, affinity, box
 
 from oxbow.testing import nasty_polygons
-from oxbow_certificate.discrepancy import discrepancy, unit_square
+from oxbow_certificate.discrepancy import centred_discrepancy, discrepancy, unit_square
 from oxbow_certificate.spread import even_places
 
 quick = settings(max_examples=15)
@@ -26,6 +26,15 @@ def measured(region, path, spacing_m=10.0):
     found = discrepancy(region, path, spacing_m, 1e-3)
     assert found is not None
     return found
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 512, 513, 1500])
+@pytest.mark.parametrize("share", [1.0, 0.3])
+def test_it_is_scipys(count, share):
+    square = share * np.random.default_rng(count).random((count, 2))
+    # The middle and the borders belong to a side too.
+    square[:2] = [[0.5, 1.0], [0.0, 0.5]][:count]
+    assert centred_discrepancy(square) == pytest.approx(qmc.discrepancy(square, method="CD"), rel=1e-7)
 
 
 def test_on_a_rectangle_it_is_scipys():

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import qmc
 
 from oxbow.arrays import FloatArray
 from oxbow.contracts import Cell, Draw
+from oxbow_path.halton import scrambled_halton
 
 __all__ = ["cell_draws", "drawn_places"]
 
@@ -55,9 +55,9 @@ def drawn_places(cells: Sequence[Cell], count: int, *, seed: int, draw: Draw) ->
 
 
 def _unit_square(count: int, generator: np.random.Generator, draw: Draw) -> FloatArray:
-    sequence = qmc.Halton(2, rng=generator).random(count)
+    sequence = scrambled_halton(count, generator)
     if draw is Draw.LOW_DISCREPANCY or count == 0:
-        return np.asarray(sequence)
+        return sequence
     first, second = generator.integers(count, size=(2, count))
     share = generator.random((count, 1))
     return np.asarray(share * sequence[first] + (1.0 - share) * sequence[second])

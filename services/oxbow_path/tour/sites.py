@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import shapely
 from scipy.spatial import cKDTree
-from scipy.stats import qmc
 from shapely import Polygon
 
 from oxbow.arrays import FloatArray
 from oxbow.geometry.triangles import spread
+from oxbow_path.halton import halton
 
 __all__ = ["cluster_centres", "low_discrepancy", "with_gaps"]
 
@@ -39,7 +39,7 @@ def low_discrepancy(free: Polygon, count: int, *, seed: int) -> FloatArray:
         Its first points alone are spread evenly, too.
     """
     shift = np.random.default_rng(seed).random(2)
-    return spread((qmc.Halton(2, scramble=False).random(count) + shift) % 1.0, free)
+    return spread((halton(count) + shift) % 1.0, free)
 
 
 def cluster_centres(samples: FloatArray, count: int, free: Polygon) -> FloatArray:
