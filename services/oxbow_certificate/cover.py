@@ -17,6 +17,12 @@ from oxbow_certificate.quadtree import Squares
 
 __all__ = ["CoverRadius", "cover_radius", "least_radius"]
 
+_MOST_FIRST = 2_000
+"""From so many squares on, the search begins."""
+
+_FINE = 4.0
+"""Bounds of the distance suffice for squares whose circumradius is more than this fraction of it: 1 / 4."""
+
 _HOPEFUL = 16
 """How many squares of a level are tried for a lower bound, by the place of the region nearest to each centre."""
 
@@ -75,8 +81,8 @@ def cover_radius(
 
     Distance is 1-Lipschitz, so that over a square it is at most that of the centre plus half the diagonal. Squares
     whose bound is not above the distance of some place of the region are dropped, and the others quartered: the
-    method of Shubert (1972) on a quadtree instead of an interval. Most squares are dropped by their distance to
-    the path's vertices, before that to its segments is computed.
+    method of Shubert (1972) on a quadtree instead of an interval. Most squares are dropped by an upper bound of
+    that distance, before the distance itself is computed.
 
     Parameters
     ----------
@@ -97,26 +103,31 @@ def cover_radius(
     """
     shapely.prepare(region)
     # The corners of the region give a first lower bound: the worst place is often a bay's end.
-    place, low_m = _farthest(shapely.get_coordinates(region), distance)
-    # Places of the path that far apart are few, and raise a bound of `low_m` by no more than 3 %.
-    bounds = distance.bounds(low_m / 2)
+    corners = shapely.get_coordinates(region)
+    place, low_m = _farthest(_farthest_centres(corners, distance.bounds(corners), distance).places, distance)
     squares = Squares.around(region)
+    # Squares as large as that distance could hardly be dropped: begin with smaller ones.
+    while squares.circumradius_m > low_m and len(squares) < _MOST_FIRST:
+        squares = squares.meeting(region).quarters()
     examined = 0
     while True:
         examined += len(squares)
-        bound_m = bounds(squares.centres)
+        bound_m = distance.bounds(squares.centres)
         hopeful, hopeful_m = _farthest_centres(squares.centres, bound_m, distance)
         candidate, candidate_m = _farthest(_nearest_places(region, hopeful), distance)
         if candidate_m > low_m:
             place, low_m = candidate, candidate_m
         # The bound of all squares together; valid wherever the loop stops.
         high_m = max(low_m * (1 + gap), hopeful_m + squares.circumradius_m)
-        # The two distances of a place come from trees in different axes: rounding must not drop a square that the
+        # The two distances of a place may be computed in different axes: rounding must not drop a square that the
         # exact one would keep.
         may_be_alive = bound_m + squares.circumradius_m > low_m * (1 + gap) - ROUNDING_M
         squares = squares.where(may_be_alive).meeting(region)
-        alive = distance(squares.centres) + squares.circumradius_m > low_m * (1 + gap)
-        squares = squares.where(alive)
+        # Bounds are mostly the distance itself. Were nothing else looked at, though, where they are not would be
+        # searched for ever.
+        if squares.circumradius_m * _FINE < low_m:
+            alive = distance(squares.centres) + squares.circumradius_m > low_m * (1 + gap)
+            squares = squares.where(alive)
         if not len(squares):
             return CoverRadius(low_m, low_m * (1 + gap), place)
         if examined + 4 * len(squares) > most_squares:
@@ -127,12 +138,15 @@ def cover_radius(
 def _farthest_centres(centres: FloatArray, bound_m: FloatArray, distance: PathDistance) -> FarthestCentres:
     """The centres farthest from the path, and the distance of the farthest, by way of upper bounds of all."""
     # A few exact distances give a threshold; a centre whose bound is below it cannot be among the farthest.
-    likely = np.argsort(-bound_m)[: 4 * _HOPEFUL]
-    least_m = np.sort(distance(centres[likely]))[-_HOPEFUL:][0]
-    centres = centres[bound_m >= least_m - ROUNDING_M]
-    centre_m = distance(centres)
-    chosen = np.argsort(-centre_m, kind="stable")[:_HOPEFUL]
-    return FarthestCentres(centres[chosen], float(centre_m[chosen[0]]))
+    order = np.argsort(-bound_m, kind="stable")
+    likely = order[: 4 * _HOPEFUL]
+    likely_m = distance(centres[likely])
+    least_m = np.sort(likely_m)[-_HOPEFUL:][0]
+    others = order[4 * _HOPEFUL : np.searchsorted(-bound_m[order], ROUNDING_M - least_m, side="right")]
+    found = np.concatenate([likely, others])
+    found_m = np.concatenate([likely_m, distance(centres[others])]) if len(others) else likely_m
+    farthest = np.lexsort([found, -found_m])[:_HOPEFUL]
+    return FarthestCentres(centres[found[farthest]], float(found_m[farthest[0]]))
 
 
 def _farthest(places: FloatArray, distance: PathDistance) -> Farthest:
@@ -142,5 +156,8 @@ def _farthest(places: FloatArray, distance: PathDistance) -> Farthest:
 
 
 def _nearest_places(region: MultiPolygon, places: FloatArray) -> FloatArray:
-    """The place of `region` nearest to each place: itself, where it is inside."""
-    return shapely.get_coordinates(shapely.shortest_line(region, shapely.points(places)))[::2]
+    """The place of `region` (prepared) nearest to each place: itself, where it is inside."""
+    beside = ~shapely.contains_xy(region, places)
+    nearest = places.copy()
+    nearest[beside] = shapely.get_coordinates(shapely.shortest_line(region, shapely.points(places[beside])))[::2]
+    return nearest
