@@ -6,6 +6,8 @@ import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.geometry.erosion import eroded
+
 __all__ = ["eroded_water", "polygons"]
 
 QUAD_SEGS = 16
@@ -45,10 +47,10 @@ def eroded_water(water: Polygon | MultiPolygon, depth_m: float, tolerance_m: flo
     done_m = 0.0
     step_m = max(depth_m / 64, mean_edge_m / 2)
     while done_m + step_m < depth_m:
-        shore = shore.buffer(-step_m, quad_segs=_STEP_QUAD_SEGS).simplify(tolerance_m / 4)
+        shore = eroded(shore, step_m, quad_segs=_STEP_QUAD_SEGS).simplify(tolerance_m / 4)
         done_m += step_m
         step_m = done_m
-    return shore.buffer(done_m - depth_m, quad_segs=QUAD_SEGS)
+    return eroded(shore, depth_m - done_m, quad_segs=QUAD_SEGS)
 
 
 def polygons(geometry: BaseGeometry) -> list[Polygon]:

@@ -6,6 +6,8 @@ import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from oxbow.geometry.erosion import eroded
+
 __all__ = ["DETOUR", "direct_leg_m", "is_basin", "is_thin", "without_narrows"]
 
 MITRE = 5.0
@@ -45,7 +47,7 @@ def without_narrows(water: Polygon | MultiPolygon, width_m: float) -> MultiPolyg
     whole = _sorted(water)
     if width_m == 0.0:
         return whole
-    core = water.buffer(-width_m / 2)
+    core = eroded(water, width_m / 2)
     if core.is_empty:
         return MultiPolygon()
     reach_m = MITRE * width_m / 2
@@ -120,7 +122,7 @@ def direct_leg_m(safety_m: float, ashore_m: float) -> float:
     return DIRECT_SHARE * safety_m + DETOUR * ashore_m
 
 
-def _rings(water: Polygon | MultiPolygon) -> tuple[int, int]:
+def _rings(water: BaseGeometry) -> tuple[int, int]:
     """How many parts and islands there are: both change where narrows connect."""
     parts = shapely.get_parts(water)
     return len(parts), int(shapely.get_num_interior_rings(parts).sum())
