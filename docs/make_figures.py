@@ -99,7 +99,10 @@ def draw_quality(layers: Layers, planned: Mission, file: Path) -> None:
     x, y = np.meshgrid(np.arange(west, east, step_m), np.arange(south, north, step_m))
     inside = shapely.contains_xy(free, x, y)
     ratio = np.full(x.shape, np.nan)
-    distances = PathDistance(path)(np.column_stack([x[inside], y[inside]])) / certificate.least_radius_m
+    distances = (
+        PathDistance(path, certificate.least_radius_m)(np.column_stack([x[inside], y[inside]]))
+        / certificate.least_radius_m
+    )
     ratio[inside] = distances
     image = field.imshow(ratio, extent=(west, east, south, north), origin="lower", cmap="YlOrRd", vmin=0.0)
     _draw_lines(field, [path], color=INK, linewidths=0.5)
@@ -141,7 +144,10 @@ def draw_plans(file: Path) -> None:
         measures = certify(CertifyRequest(outline=SQUARE, path=path, launch=ends[0], recovery=ends[1]))
         west, south, east, north = SQUARE.bounds
         x, y = np.meshgrid(np.linspace(west, east, 160), np.linspace(south, north, 160))
-        radii = PathDistance(path)(np.column_stack([x.ravel(), y.ravel()])) / measures.least_radius_m
+        radii = (
+            PathDistance(path, measures.least_radius_m)(np.column_stack([x.ravel(), y.ravel()]))
+            / measures.least_radius_m
+        )
         extent = (west, east, south, north)
         axes.imshow(radii.reshape(x.shape), extent=extent, origin="lower", cmap=GAPS, vmin=0.0, vmax=MOST_RADII)
         _draw_lines(axes, [path], color=INK, linewidths=0.7)

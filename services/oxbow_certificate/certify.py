@@ -71,10 +71,10 @@ def judge(request: CertifyRequest) -> Judgement:
     space = JudgedSpace.of(request)
     lines = [track.path for track in request.tracks]
     paths = lines[0] if len(lines) == 1 else MultiLineString(lines)
-    distance = PathDistance(paths)
+    least_m = least_radius(space.judged.area, paths.length, len(lines))
+    distance = PathDistance(paths, least_m)
     cover = cover_radius(space.judged, distance)
     spread = distance_spread(space.judged, distance)
-    least_m = least_radius(space.judged.area, paths.length, len(lines))
     # The true water, not the judged one: rules are about the shore as the mission has it, to a centimetre.
     shore = Shore(space.water, request.safety_m, request.least_width_m)
     # 2. How each path by itself keeps the rules, and what threatens it.

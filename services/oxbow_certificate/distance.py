@@ -22,8 +22,8 @@ def segments_of(paths: Paths) -> npt.NDArray[Any]:
     return np.asarray(shapely.linestrings(segment_ends(paths)))
 
 
-_PIECES = 4_000
-"""A path is cut into at least about this many pieces: a few of them are then near any place."""
+_MOST_PIECES = 200_000
+"""A path is cut into at most about so many pieces, besides its own segments."""
 
 _LOOKS = (6, 12, 24, 48)
 """How many pieces a place is compared with, from round to round, before the R-tree is asked."""
@@ -32,17 +32,25 @@ _CHUNK = 50_000
 
 
 class PathDistance:
-    """Exact distance from places to paths, which are cut into pieces no longer than a 4 000th of all.
+    """Exact distance from places to paths, which are cut into pieces no longer than that mostly is.
 
     A place is compared with the pieces whose middles are the nearest, by a k-d tree (Bentley 1975), until even
     half the longest piece could not bring the next one nearer. Where waypoints are dense, or the whole path is
     equally far, that would take too many pieces: such places ask an R-tree (STR, Leutenegger et al. 1997).
+
+    Parameters
+    ----------
+    paths
+        To which distances are taken.
+    about_m
+        How far places mostly are, to a factor of a few: a few pieces so long are near any place. It decides how
+        long distances take, not what they are.
     """
 
-    def __init__(self, paths: Paths) -> None:
-        ends = segment_ends(paths.segmentize(paths.length / _PIECES))
+    def __init__(self, paths: Paths, about_m: float) -> None:
+        self._paths = paths.segmentize(max(about_m, paths.length / _MOST_PIECES))
+        ends = segment_ends(self._paths)
         steps = ends[:, 1] - ends[:, 0]
-        self._paths = paths
         self._middle = ends.mean(axis=1)
         self._half_m = np.hypot(*steps.T) / 2
         self._along = steps / (2.0 * self._half_m[:, None])
@@ -91,14 +99,13 @@ class PathDistance:
 class _SegmentTree:
     """The same distance by an R-tree: slower, but no slower where waypoints are dense.
 
-    The axes lie along the paths, so that the boxes of parallel legs are narrow.
+    The axes lie along the paths, so that the boxes of parallel legs are narrow. They are cut already: the box of a
+    long oblique segment is mostly empty.
     """
 
     def __init__(self, paths: Paths) -> None:
         self._along = main_direction(paths)
-        upright = shapely.transform(paths, lambda xy: coordinates_along(xy, self._along))
-        # Cut as well: the box of a long oblique segment is mostly empty.
-        self._tree = STRtree(segments_of(upright.segmentize(paths.length / _PIECES)))
+        self._tree = STRtree(segments_of(shapely.transform(paths, lambda xy: coordinates_along(xy, self._along))))
 
     def __call__(self, places: FloatArray) -> FloatArray:
         points = shapely.points(coordinates_along(places, self._along))

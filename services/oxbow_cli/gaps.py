@@ -204,7 +204,7 @@ def _draw_distance(axes: Axes, region: MultiPolygon, paths: Paths, unit: Unit) -
     shapely.prepare(near)
     wanted = shapely.contains_xy(near, places[..., 0], places[..., 1])
     distance = np.full(wanted.shape, np.nan)
-    distance[wanted] = PathDistance(paths)(places[wanted]) / unit.length_m
+    distance[wanted] = PathDistance(paths, unit.length_m)(places[wanted]) / unit.length_m
     # A raster: between thousands of legs the distance has more ridges than contour lines could show.
     image = axes.imshow(
         distance,

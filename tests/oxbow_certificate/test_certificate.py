@@ -211,7 +211,7 @@ def test_agrees_with_the_independent_judge(name):
 def test_the_spread_of_distance_is_that_of_many_more_places():
     pond = Polygon([(0, 0), (900, 100), (700, 300), (1000, 900), (400, 600), (100, 1000)])
     region = MultiPolygon([pond.difference(box(300, 300, 400, 350))])
-    distance = PathDistance(LineString([(0, 0), (600, 300), (900, 800)]))
+    distance = PathDistance(LineString([(0, 0), (600, 300), (900, 800)]), 100.0)
     few, many = distance_spread(region, distance), distance_spread(region, distance, count=200_000)
     for measure in ("mean_m", "p95_m", "p99_m"):
         assert getattr(few, measure) == pytest.approx(getattr(many, measure), rel=0.005), measure

@@ -20,7 +20,7 @@ def test_distance_is_shapelys(walk, shift):
     path = LineString(np.array(walk) + shift)
     places = np.random.default_rng(1).uniform(-200, 200, (200, 2)) + shift
     expected = shapely.distance(path, shapely.points(places))
-    assert PathDistance(path)(places) == pytest.approx(expected, abs=1e-7)
+    assert PathDistance(path, 10.0)(places) == pytest.approx(expected, abs=1e-7)
 
 
 def tangle() -> LineString:
@@ -32,7 +32,7 @@ def tangle() -> LineString:
 def test_distance_is_shapelys_where_waypoints_are_dense():
     path = tangle()
     places = np.random.default_rng(1).uniform([950, -50], [1050, 50], (500, 2))
-    distance = PathDistance(path)
+    distance = PathDistance(path, 10.0)
     assert distance(places) == pytest.approx(shapely.distance(path, shapely.points(places)), abs=1e-9)
     # Such places are what the R-tree is for: it has been asked.
     assert "_rtree" in vars(distance)
@@ -41,7 +41,7 @@ def test_distance_is_shapelys_where_waypoints_are_dense():
 def test_bounds_are_no_less_than_the_distance_and_mostly_equal():
     path = LineString([(x, y) for y in range(0, 100, 10) for x in ((0, 100) if y % 20 else (100, 0))])
     places = np.random.default_rng(3).uniform(-20, 120, (5000, 2))
-    distance = PathDistance(path)
+    distance = PathDistance(path, 10.0)
     bound_m, distance_m = distance.bounds(places), distance(places)
     assert (bound_m >= distance_m).all()
     assert np.mean(bound_m > distance_m) < 0.1
@@ -49,7 +49,7 @@ def test_bounds_are_no_less_than_the_distance_and_mostly_equal():
 
 def test_more_places_than_one_query_takes_keep_their_order():
     places = np.random.default_rng(4).uniform(0, 10, (120_001, 2))
-    distance_m = PathDistance(LineString([(0, 0), (10, 0)]))(places)
+    distance_m = PathDistance(LineString([(0, 0), (10, 0)]), 5.0)(places)
     assert distance_m == pytest.approx(places[:, 1], abs=1e-9)
 
 
