@@ -12,6 +12,7 @@ import shapely
 from shapely import LineString
 
 from oxbow.arrays import FloatArray, Geometries, Indices
+from oxbow.tolerances import ROUNDING_M
 
 __all__ = ["PathSegments", "clipped_stretches", "covered_m", "gaps_between", "merged_stretches"]
 
@@ -70,13 +71,14 @@ class PathSegments:
 
 
 def merged_stretches(stretches: FloatArray) -> FloatArray:
-    """The same stretches in order, with those that meet joined."""
+    """The same stretches in order, with those that meet, but for rounding, joined."""
     if len(stretches) == 0:
         return stretches
     stretches = stretches[np.argsort(stretches[:, 0], kind="stable")]
     # A stretch may lie inside an earlier one: what counts is the farthest end so far.
     reach = np.maximum.accumulate(stretches[:, 1])
-    first = np.flatnonzero(np.concatenate([[True], stretches[1:, 0] > reach[:-1]]))
+    # Parts of two segments that share a vertex may end a rounding error apart: that gap is no part of the path.
+    first = np.flatnonzero(np.concatenate([[True], stretches[1:, 0] > reach[:-1] + ROUNDING_M]))
     return np.column_stack([stretches[first, 0], reach[np.append(first[1:] - 1, len(reach) - 1)]])
 
 

@@ -38,6 +38,18 @@ def test_a_launch_ashore_makes_its_own_distance_over_land_necessary():
     assert leg.unsafe_m == pytest.approx(17.9, abs=0.05)
 
 
+@pytest.mark.parametrize("heading_deg", range(0, 90, 15))
+@pytest.mark.parametrize("ashore_m", [5, 6, 8, 10, 13])
+def test_a_leg_goes_on_where_two_of_its_segments_meet(heading_deg, ashore_m):
+    """Its stretch over land and that before the shore end and begin at one vertex, but for rounding."""
+    out = [(-ashore_m, 100), (0, 100), (60, 110), (80, 100), (60, 90), (0, 99.99), (-ashore_m, 100)]
+    path, water = (affinity.rotate(each, heading_deg, origin=(0, 0)) for each in (LineString(out), LAKE))
+    # Too short a way in safe water to be told from a wide spot: the legs are what begins and ends the path.
+    found = conduct(path.coords, water, safety_m=50.0)
+    assert found.faults == ()
+    assert [leg.unsafe_m for leg in found.legs] == pytest.approx([ashore_m + 50.2] * 2, abs=0.1)
+
+
 def test_a_slanting_way_over_land_exceeds_what_is_necessary():
     found = conduct([(-8, 100), (20, 150), (50, 150)])
     assert rules(found) == [Rule.OUTSIDE]
