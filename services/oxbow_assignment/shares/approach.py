@@ -21,7 +21,8 @@ from oxbow.arrays import FloatArray, Place
 from oxbow.contracts import Approach, MiddleLine, Share, Vehicle
 from oxbow.contracts.budget import too_short
 from oxbow.errors import Infeasible
-from oxbow.geometry.lanes import legs_length_m
+from oxbow.geometry.conformance import SHORE_TOLERANCE_M
+from oxbow.geometry.lanes import lane, legs_length_m
 from oxbow.geometry.route import Landing, RouteMethod, Router, Routes, leg_routes, make_router, way_to
 from oxbow.tolerances import ON_SHORE_M, ROUNDING_M
 
@@ -134,19 +135,39 @@ class Harbour:
         """The middle line of a leg from a place to a share, in lanes as wide as the water allows.
 
         Lanes too wide for the water between a place on the shore and a share right beside it begin in the share,
-        and would lead through the path there: narrower ones are taken, where there are any.
+        and would lead through the path there. Others are too wide for narrow water on the way from the place to
+        where they begin. Narrower ones are taken, where there are any.
         """
         last: _Way | None = None
+        # Legs that keep clear of the share, but for which some water is too narrow at their full distance.
+        close: _Way | None = None
         for lanes in self._lanes:
             line = lanes.to_gate(share, place)
             if line is None:
                 continue
             last = _Way(lanes, line)
-            if LineString(line).intersection(share).length <= ROUNDING_M:
+            if LineString(line).intersection(share).length > ROUNDING_M:
+                continue
+            if self._has_room(last, place):
                 return last
+            close = close or last
         if last is None:
             raise Infeasible("lies in water from which no route leads to the vehicle's share", where)
-        return last
+        return close or last
+
+    def _has_room(self, way: _Way, place: Place) -> bool:
+        """Whether legs as far from a middle line as its lanes ask for keep to where they may run, on either side.
+
+        Where they do not, stage `path` brings them nearer to it; but along a rim no distance is small enough.
+        """
+        middle = self._middle_line(way.line, place)
+        sides = [np.vstack([lane(middle, side * way.lanes.apart_m), way.gate]) for side in (1.0, -1.0)]
+        stray = shapely.union_all([LineString(leg) for leg in sides]).difference(self._free_and_tolerance)
+        return bool(stray.difference(way.lanes.beside_entry(place).buffer(SHORE_TOLERANCE_M)).is_empty)
+
+    @cached_property
+    def _free_and_tolerance(self) -> BaseGeometry:
+        return self.free.buffer(SHORE_TOLERANCE_M)
 
 
 @dataclass(frozen=True)

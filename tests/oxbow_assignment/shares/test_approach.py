@@ -130,6 +130,17 @@ def test_once_in_free_space_legs_keep_to_it(start):
     assert (path - free.buffer(0.01)).is_empty
 
 
+@pytest.mark.parametrize("start", [(-303.0, 187.0), (-300.0, 188.0), (-302.0, 190.0)])
+@pytest.mark.parametrize("safety_m", [1.0, 7.0])
+def test_lanes_fit_a_canal_before_the_water_that_has_room_for_wider_ones(start, safety_m):
+    """From its corner, a middle line that only aims at the wide water leaves the rim at a slant."""
+    water = LAKE | box(-300, 190, 1, 210)
+    free = water.buffer(-safety_m, join_style="mitre")
+    east = free & box(600, 0, 1000, 400)
+    path = whole(Harbour(free, water, 150.0).share(east, vehicle(start)).approach, start, start)
+    assert (path - free.buffer(0.01) - Point(start).buffer(1.5 * free.distance(Point(start)))).is_empty
+
+
 @pytest.mark.parametrize("field", ["start", "recovery"])
 def test_water_without_a_way_to_the_share_is_refused_by_the_place_it_is_missing_from(field):
     apart = box(0, 0, 100, 100)
