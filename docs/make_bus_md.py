@@ -95,6 +95,10 @@ Oxbow's processes meet on [Zenoh](https://zenoh.io) 1.x, each in `client` mode a
   of its requests, and asks another if the first is busy or lost. `oxbow.bus.client.Bus.call` does all of this.
 - Chunks that begin with `@` are matched by no wildcard: `oxbow/v1/stage/*/*` asks stages to work, and
   `{any_introspection_key("ping")}` asks them, the mission service and the recorder for their state.
+- A query may have the parameters that are named here, each once. The mission service refuses any other, except
+  those that begin with `_`, which are Zenoh's own.
+- A key of a mission that is not among those below, such as `{MissionKey("lake", "bogus")}`, is nobody's: a query
+  to it has no reply, as if it was lost.
 """
 
 INNER = (
@@ -185,7 +189,8 @@ def _stages() -> Iterator[str]:
     yield (
         "A request to a stage travels with an `Envelope` (JSON) as the query's attachment. A reply has the"
         " request's id attached, and an error carries it as a `StageError`: nothing else is an answer. Another"
-        " request under the same id is refused. An unknown key below an instance's is answered with an error.\n"
+        " request under the same id is refused. An unknown key below an instance's is answered with an error,"
+        " unless one of its chunks begins with `@`: such a key has no reply.\n"
     )
     yield _message(Envelope)
     yield _message(StageError)

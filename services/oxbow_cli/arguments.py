@@ -14,7 +14,7 @@ import msgspec
 
 from oxbow.bus.config import require_endpoint
 from oxbow.contracts import MOST_DEADLINE_S, Draw, Method, RouteMethod
-from oxbow.errors import InvalidOption, OxbowError, renamed
+from oxbow.errors import InvalidOption, InvalidRequest, OxbowError, renamed
 from oxbow.geometry.frame import Position
 from oxbow.mission.file import Mission, read_mission
 from oxbow.mission.plan import PlanOptions
@@ -123,19 +123,26 @@ def plan_options(
     Raises
     ------
     InvalidOption
-        A name is unknown, or the heading is not finite; names the option.
+        A name is unknown, or a number is not finite or out of bounds; names the option.
     """
     if heading_deg is not None and not math.isfinite(heading_deg):
         raise InvalidOption(f"is {heading_deg!r}; expected degrees clockwise from north", where="--heading")
-    return PlanOptions(
-        method=_one_of(Method, method, "--method"),
-        seed=seed,
-        heading_rad=None if heading_deg is None else math.radians(heading_deg),
-        time_limit_s=time_limit_s,
-        smooth=smooth,
-        draw=_one_of(Draw, draw, "--draw"),
-        router=_one_of(RouteMethod, router, "--router"),
-    )
+    try:
+        return PlanOptions(
+            method=_one_of(Method, method, "--method"),
+            seed=seed,
+            heading_rad=None if heading_deg is None else math.radians(heading_deg),
+            time_limit_s=time_limit_s,
+            smooth=smooth,
+            draw=_one_of(Draw, draw, "--draw"),
+            router=_one_of(RouteMethod, router, "--router"),
+        )
+    except InvalidRequest as error:
+        raise InvalidOption(error.message, where=_OPTIONS[error.where]) from error
+
+
+_OPTIONS = {"seed": "--seed", "heading_rad": "--heading", "time_limit_s": "--time-limit"}
+"""What the user knows the fields of `PlanOptions` by that a message checks itself."""
 
 
 def _one_of(names: type[E], text: str, where: str) -> E:

@@ -143,13 +143,13 @@ def _paths(mission: Mission, site: Site) -> Iterator[_Path]:
         )
     where = "Paths" if mission.vehicles else f"{site.members[0].vehicle.role.capitalize()}_Path"
     if not named:
-        raise InvalidMission("has 0 waypoints; expected a path: `oxbow plan` makes one", where=where)
+        raise InvalidMission("has 0 waypoints; expected a path: oxbow plan makes one", where=where)
     for name, member in members.items():
         if (waypoints := named.get(name)) is None:
             continue
         if len(waypoints) < 2:
             raise InvalidMission(
-                f"has {len(waypoints)} waypoints; expected a path: `oxbow plan` makes one", where=where
+                f"has {len(waypoints)} waypoints; expected a path: oxbow plan makes one", where=where
             )
         # Both lengths: in the plane for what is judged there, along the earth for what a vehicle really travels.
         degrees = lonlat(waypoints)

@@ -37,6 +37,6 @@ def explain(error: Exception) -> None:
     if DEBUG in os.environ:
         traceback.print_exception(error)
     elif exit_status(error) == _STATUS[ErrorCode.INTERNAL]:
-        text += " (a fault of Oxbow's own; `oxbow --debug ...` shows more)"
+        text += " (a fault of Oxbow's own; oxbow --debug ... shows more)"
     # On one line whatever the text quotes, so that it can be read by `grep` and in logs.
     print("error:", " ".join(text.split()), file=sys.stderr)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from oxbow.contracts import Conformance, Measures, Method, MissionState
+from oxbow.contracts import Conformance, Leg, Measures, Method, MissionState
 from oxbow.geometry.frame import Position
 from oxbow_cli.streams import print_utf8
 
@@ -119,7 +119,7 @@ def _plan_table(site: str, plan: PlanRecord) -> Table:
         ("waypoints", f"{certificate.waypoints}"),
         *(_quality_rows(certificate) if _surveys(plan) else _reach_rows(plan)),
         # A way home may cross the way out where hot spots are treated between them.
-        ("conforms", _conformance(certificate.is_simple if _surveys(plan) else None, certificate)),
+        ("conforms", _conformance(certificate.is_simple if _surveys(plan) else None, certificate, _legs(plan))),
         *(
             ()
             if certificate.danger is None
@@ -177,7 +177,7 @@ def _fleet_rows(plan: PlanRecord) -> Rows:
             task += f" {vehicle.area_m2 / 1e6:.3f} km2"
         danger = vehicle.certificate.danger
         risk = "" if danger is None else f"; danger {danger:.1%}"
-        ashore_m, unsafe_m = _of_legs(vehicle.certificate)
+        ashore_m, unsafe_m = _lengths(vehicle.certificate.legs)
         legs = f"; legs {ashore_m:.2f} m over land, {unsafe_m:.0f} m within Safety" if unsafe_m else ""
         yield vehicle.name, f"{vehicle.role}: {way}; {task}{risk}{legs}"
     if plan.treatment is None:
@@ -315,19 +315,29 @@ def _table(title: str, rows: Rows) -> Table:
     return table
 
 
-def _conformance(is_simple: bool | None, found: Conformance) -> str:
+def _conformance(is_simple: bool | None, found: Conformance, own_legs: Sequence[Leg]) -> str:
     """Whether the rules are kept, and what legs need; `is_simple` is None if a path may cross itself."""
     simple = {None: "", True: "never crosses itself; ", False: "CROSSES ITSELF; "}[is_simple]
-    ashore_m, unsafe_m = _of_legs(found)
+    ashore_m, unsafe_m = _lengths(own_legs)
     legs = f"; on its legs {ashore_m:.2f} m over land, {unsafe_m:.0f} m within Safety" if unsafe_m else ""
     # What legs need over land is part of all that lies outside: it is reported by itself.
     outside_m = max(found.outside_m - ashore_m, 0.0)
     return f"{simple}{outside_m:.2f} m outside, {found.unsafe_m:.2f} m within Safety{legs}"
 
 
-def _of_legs(found: Conformance) -> tuple[float, float]:
-    """Metres of the legs over land, and metres nearer to the shore than Safety."""
-    return sum(leg.ashore_m for leg in found.legs), sum(leg.unsafe_m for leg in found.legs)
+def _legs(plan: PlanRecord) -> tuple[Leg, ...]:
+    """The legs of all paths that the plan's own certificate is about."""
+    if plan.fleet is None:
+        return plan.certificate.legs
+    # That of several paths has no legs: each vehicle has its own. Those that it is about come first.
+    vehicles = plan.fleet.vehicles
+    own = (vehicle for vehicle in vehicles if vehicle.role is vehicles[0].role)
+    return tuple(leg for vehicle in own for leg in vehicle.certificate.legs)
+
+
+def _lengths(legs: Sequence[Leg]) -> tuple[float, float]:
+    """Metres of legs over land, and metres nearer to the shore than Safety."""
+    return sum(leg.ashore_m for leg in legs), sum(leg.unsafe_m for leg in legs)
 
 
 def _dropped(plan: PlanRecord) -> Iterator[str]:

@@ -156,7 +156,9 @@ class Registry(Closing):
             self._changed.notify_all()
             latest = self.statuses(mission_id)
         if not latest:
-            raise InvalidRequest("is not kept here; expected a mission submitted before", where=mission_id)
+            raise InvalidRequest(
+                "is not kept here; expected a mission submitted before", where=f"mission {mission_id}"
+            )
         return latest[0]
 
     # ----------------------------------------------------------------- planning

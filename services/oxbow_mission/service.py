@@ -85,7 +85,7 @@ class MissionService(Closing):
         bus.answer(_any("status"), self._status, workers=2, queue_size=MOST_QUEUED)
         # The latest plan, and each revision's under a key of its own.
         history = [_any(what, revision) for what in ("plan", "replan") for revision in (None, ANY)]
-        bus.answer(history, self._history, workers=2, queue_size=MOST_QUEUED)
+        bus.answer(history, self._history, parameters=("after",), workers=2, queue_size=MOST_QUEUED)
         self._keeper = threading.Thread(target=self._keep_house, name="keeper", daemon=True)
         self._keeper.start()
         # Last of all: whoever sees the token asks at once.

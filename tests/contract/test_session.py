@@ -76,7 +76,10 @@ def test_a_faulty_subscriber_loses_one_sample_only(bus: Bus, other: Bus) -> None
 
 
 def test_an_answer_sees_parameters_and_payload(bus: Bus, other: Bus) -> None:
-    other.answer("test/echo", lambda key, parameters, payload: [(key, f"{parameters} {payload!r}".encode())])
+    def echo(key: str, parameters: dict[str, str], payload: bytes) -> list[tuple[str, bytes]]:
+        return [(key, f"{parameters} {payload!r}".encode())]
+
+    other.answer("test/echo", echo, parameters=("method", "name", "flag"))
     ready(other, bus)
     [(_, reply)] = bus.query("test/echo?method=Transect;name=a%20lake;flag", b"body", timeout_s=5.0)
     assert reply.decode() == "{'method': 'Transect', 'name': 'a lake', 'flag': ''} b'body'"

@@ -4,11 +4,14 @@ import json
 import os
 
 import pytest
+from msgspec.structs import replace
 
+from oxbow.contracts import Leg
 from oxbow.mission.file import read_mission
 from oxbow.site.site import Site
-from oxbow_cli import chart, sheet
+from oxbow_cli import chart, report, sheet
 from oxbow_cli.picture import DANGER
+from oxbow_cli.planning import PlannedMission
 from tests.support.project import EXAMPLES
 
 TREAT, FLEET = EXAMPLES / "treat.json", EXAMPLES / "fleet.json"
@@ -78,3 +81,22 @@ def test_the_start_that_a_vehicle_has_to_itself_is_drawn():
     _, axes = sheet.new_sheet(site)
     chart.draw_ends(axes, site)
     assert [text.get_text() for text in axes.texts] == ["launch and recovery", "coot: launch and recovery"]
+
+
+@pytest.mark.usefixtures("treated")
+def test_what_legs_of_a_fleet_need_over_land_is_reported_by_itself(folder, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    mission = read_mission(folder / "treated.json")
+    plan, possible = mission.plan, {"least_ashore_m": 0.0, "most_unsafe_m": 20.0}
+    legs = (Leg(ashore_m=1.01, unsafe_m=12.0, **possible), Leg(ashore_m=0.5, unsafe_m=3.0, **possible))
+    own = {"outside_m": 1.51, "unsafe_m": 0.0}
+    vehicles = tuple(
+        replace(each, certificate=replace(each.certificate, legs=(leg,)))
+        for each, leg in zip(plan.fleet.vehicles, legs, strict=True)
+    )
+    plan = replace(
+        plan, certificate=replace(plan.certificate, **own), fleet=replace(plan.fleet, vehicles=vehicles)
+    )
+    report.print_plan(PlannedMission(replace(mission, plan=plan), None), folder / "treated.json")
+    told = capsys.readouterr().out
+    assert "0.00 m outside, 0.00 m within Safety; on its legs 1.51 m over land, 15 m within Safety" in told

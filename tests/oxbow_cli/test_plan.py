@@ -57,6 +57,8 @@ def test_writes_elsewhere_when_asked(oxbow, folder):
         ({}, ["--record", "pond.rrd"], 2, ["--record"]),
         ({}, ["-o", "missing/planned.json"], 2, ["missing/planned.json", "does not exist"]),
         ({}, ["-o", "."], 2, ["is a folder"]),
+        ({}, ["--seed", str(2**54)], 2, ["error: --seed: is 18014398509481984", f"at most {2**53}"]),
+        ({}, ["--seed", str(2**70)], 2, ["error: --seed: is an integer of 71 bits"]),
         ({}, ["--heading", "nan"], 2, ["--heading", "nan", "degrees"]),
     ],
 )

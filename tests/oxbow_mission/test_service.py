@@ -197,8 +197,39 @@ def test_an_id_that_cannot_be_kept_is_answered_under_its_encoded_form(client: Cl
 
 def test_unknown_parameters_are_refused(client: Client, bus: Bus) -> None:
     assert client.statuses() is not None
-    with pytest.raises(InvalidRequest, match="sed=1"):
-        bus.query(f"{PLAN_KEY}?sed=1", mission_file(), timeout_s=WAIT_S)
+    client.plan(mission_file(), mission_id="asked")
+    every = "method, seed, .*"
+    for selector, given, expected in (
+        (PLAN_KEY, "sed=1", every),
+        (mission_key("asked", "request"), "sed=1", every),
+        (mission_key("asked", "status"), "before=1", "none"),
+        (mission_key("asked", "cancel"), "before=1", "none"),
+        (mission_key("asked", "plan"), "before=1", "after and nothing else"),
+        (f"{mission_key('asked', 'plan')}/*", "after=0;before=1", "after and nothing else"),
+        ("oxbow/v1/stage/mission/*/@ping", "before=1", "none"),
+    ):
+        with pytest.raises(InvalidRequest, match=f"^parameters: has '(sed|before)'; expected {expected}"):
+            bus.query(f"{selector}?{given}", mission_file(), timeout_s=WAIT_S)
+
+
+def test_a_parameter_that_is_given_twice_is_refused(client: Client, bus: Bus) -> None:
+    assert client.statuses() is not None
+    twice = r"^parameters: has '(seed|after)' twice; expected each name once"
+    for selector in (f"{PLAN_KEY}?seed=1;seed=2", f"{mission_key('asked', 'plan')}/*?after=1;after=1"):
+        with pytest.raises(InvalidRequest, match=twice):
+            bus.query(selector, mission_file(), timeout_s=WAIT_S)
+
+
+def test_a_parameter_of_zenohs_own_is_no_part_of_a_question(client: Client, bus: Bus) -> None:
+    client.plan(mission_file(), mission_id="asked")
+    [(key, _)] = bus.query(f"{mission_key('asked', 'status')}?_anyke", timeout_s=WAIT_S)
+    assert key == mission_key("asked", "status")
+
+
+def test_what_is_unknown_cannot_be_cancelled_and_is_named(client: Client, bus: Bus) -> None:
+    assert client.statuses() is not None
+    with pytest.raises(InvalidRequest, match=r"^mission unheard-of: is not kept here"):
+        bus.query(mission_key("unheard-of", "cancel"), timeout_s=WAIT_S)
 
 
 # --------------------------------------------------------------------------- puts, plans and replans

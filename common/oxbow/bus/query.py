@@ -5,12 +5,12 @@ from __future__ import annotations
 import logging
 from types import TracebackType
 from typing import Self
-from urllib.parse import unquote
 
 import msgspec
 import zenoh
 
 from oxbow.errors import ErrorReply, Internal, error_text
+from oxbow.wire.parameters import parameters_of
 
 __all__ = ["JSON", "MSGPACK", "Query"]
 
@@ -33,8 +33,8 @@ class Query:
 
     @property
     def parameters(self) -> dict[str, str]:
-        pairs = (part.partition("=") for part in str(self._query.parameters).split(";") if part)
-        return {unquote(name): unquote(value) for name, _, value in pairs}
+        """By name; `InvalidRequest` where one is given twice (`oxbow.wire.parameters`)."""
+        return parameters_of(str(self._query.parameters))
 
     @property
     def size_bytes(self) -> int:

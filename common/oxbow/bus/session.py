@@ -10,7 +10,7 @@ import atexit
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import Self
 
 import zenoh
@@ -25,6 +25,7 @@ from oxbow.bus.replies import error_of
 from oxbow.bus.subscription import Audience, Declared, OnQuery, OnSample, Subscription
 from oxbow.errors import Busy, ErrorReply, OxbowError, Unavailable
 from oxbow.runtime.closing import Closing
+from oxbow.wire.parameters import require_known
 from oxbow.wire.waits import checked_wait
 
 __all__ = ["Session"]
@@ -210,12 +211,18 @@ class Session(Closing):
         return self._keep(Subscription([declared], mailbox))
 
     def answer(
-        self, key_expr: str | Iterable[str], on_query: OnQuery, *, workers: int = 1, queue_size: int = 64
+        self,
+        key_expr: str | Iterable[str],
+        on_query: OnQuery,
+        *,
+        parameters: Collection[str] = (),
+        workers: int = 1,
+        queue_size: int = 64,
     ) -> Subscription:
         """Answer queries (JSON).
 
         An `OxbowError` travels to the asker unchanged; any other exception is logged and travels as `internal`.
-        A query that finds the queue full is answered `busy`.
+        A query that finds the queue full is answered `busy`, and one with an unknown parameter `invalid_request`.
 
         Parameters
         ----------
@@ -223,6 +230,8 @@ class Session(Closing):
             The keys to answer for, as one expression or several.
         on_query
             Called with the key, the parameters and the payload of each query; gives the replies.
+        parameters
+            The names of all parameters that a query may have.
         workers
             Threads that answer, for all of the keys together.
         queue_size
@@ -238,7 +247,9 @@ class Session(Closing):
         def deliver(query: Query) -> None:
             with query:
                 try:
-                    for key, reply in on_query(query.key, query.parameters, query.payload):
+                    given = query.parameters
+                    require_known(given, parameters)
+                    for key, reply in on_query(query.key, given, query.payload):
                         query.reply(key, reply)
                 except OxbowError as error:
                     query.fail(ErrorReply.of(error))

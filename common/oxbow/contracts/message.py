@@ -76,8 +76,13 @@ def require_finite(
         # `not`, since NaN compares false. An integer may be too large for `math.isfinite`, but it compares.
         if value is not None and not (least <= value <= most and value > above):
             accepted = f"> {above}" if above > -math.inf else f">= {least}" if least > -math.inf else "any"
-            bound = "" if most == sys.float_info.max else f", at most {most:g}"
+            bound = "" if most == sys.float_info.max else f", at most {_bound(most)}"
             raise InvalidRequest(f"is {_shown(value)}; expected a finite number, {accepted}{bound}", where=field)
+
+
+def _bound(most: float) -> str:
+    """A bound in an error message; one for integers with all of its digits."""
+    return str(most) if isinstance(most, int) else f"{most:g}"
 
 
 def _shown(value: float) -> str:

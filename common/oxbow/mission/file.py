@@ -101,20 +101,15 @@ JSON_NAMES = {
     "paths": "Paths",
     "plan": "Plan",
 }
-_POSITIVE = (
-    "master_speed_mps",
-    "slave_speed_mps",
-    "master_length_m",
-    "slave_length_m",
-    "minimal_spatial_rate_m",
-    "swath_m",
-)
-_RANGES = dict.fromkeys(_POSITIVE, (LEAST_LENGTH_M, MOST_LENGTH_M)) | {
+_TRAVELLED = ("master_speed_mps", "slave_speed_mps", "master_length_m", "slave_length_m")
+_WIDTHS = ("minimal_spatial_rate_m", "swath_m", "footprint_m")
+_RANGES = {
+    **dict.fromkeys(_TRAVELLED, (LEAST_LENGTH_M, MOST_LENGTH_M)),
+    **dict.fromkeys(_WIDTHS, (LEAST_LENGTH_M, FARTHEST_M)),
     "danger_detour_m": (0.0, MOST_LENGTH_M),
     "safety_m": (0.0, FARTHEST_M),
     "shore_tolerance_m": (0.0, 10_000.0),
     "least_width_m": (1e-3, 1_000.0),
-    "footprint_m": (LEAST_LENGTH_M, FARTHEST_M),
 }
 """Least and greatest values: a seam of rounding width is never water, and nobody carries a boat for hours."""
 _PARTS: dict[str, tuple[type[msgspec.Struct], bool]] = {

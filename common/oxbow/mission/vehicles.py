@@ -12,6 +12,7 @@ from oxbow.contracts import Role
 from oxbow.contracts.message import LEAST_LENGTH_M, MOST_LENGTH_M
 from oxbow.errors import InvalidMission
 from oxbow.geometry.frame import Position
+from oxbow.ids import MOST_ID_CHARACTERS, excerpt
 
 __all__ = ["GivenVehicle", "VehiclePath", "require_distinct"]
 
@@ -76,6 +77,10 @@ def require_distinct(vehicles: Sequence[GivenVehicle]) -> None:
         where = f"Vehicles[{index}]"
         if not vehicle.name:
             raise InvalidMission("is empty; expected a name for every vehicle", where=f"{where}.Name")
+        if len(vehicle.name) > MOST_ID_CHARACTERS:
+            raise InvalidMission(
+                f"is {excerpt(vehicle.name)}; expected at most {MOST_ID_CHARACTERS} characters", f"{where}.Name"
+            )
         # Plans, recordings and errors tell vehicles apart by their names alone.
         if (first := seen.setdefault(vehicle.name, index)) < index:
             raise InvalidMission(
@@ -90,7 +95,9 @@ def require_distinct(vehicles: Sequence[GivenVehicle]) -> None:
                 )
         # A factor below 1 would make danger attractive.
         factors = {"Danger_factor": vehicle.danger_factor}
-        factors |= {f"Danger_factors[{spot!r}]": own for spot, own in (vehicle.danger_factors or {}).items()}
+        factors |= {
+            f"Danger_factors[{excerpt(spot)}]": own for spot, own in (vehicle.danger_factors or {}).items()
+        }
         for field, factor in factors.items():
             if factor is not None and not 1.0 <= factor < math.inf:
                 raise InvalidMission(f"is {factor!r}; expected a finite number >= 1", where=f"{where}.{field}")

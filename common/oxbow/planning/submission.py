@@ -8,6 +8,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
+from typing import Any
 from urllib.parse import quote
 
 import msgspec
@@ -16,11 +17,12 @@ from oxbow.contracts import DEFAULT_DEADLINE_S, MOST_DEADLINE_S, checked_id, req
 from oxbow.errors import InvalidRequest
 from oxbow.ids import excerpt
 from oxbow.mission.file import Mission, PlanOptions, mission_json, parse_mission
+from oxbow.wire.parameters import require_known
+from oxbow.wire.strict_json import described
 
 __all__ = ["Submission", "SubmissionParameters"]
 
 MOST_NAME_CHARACTERS = 48
-MOST_REASON_CHARACTERS = 256
 
 
 class SubmissionParameters(PlanOptions, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -52,14 +54,9 @@ class SubmissionParameters(PlanOptions, frozen=True, kw_only=True, forbid_unknow
     @classmethod
     def parse(cls, parameters: Mapping[str, str]) -> SubmissionParameters:
         """Read the text of parameters; `InvalidRequest` names the one that is unknown or mistyped."""
-        try:
-            # Not strict: the parameters of a query are text, those that are numbers as well.
-            return msgspec.convert(dict(parameters), cls, strict=False)
-        except msgspec.ValidationError as error:
-            given = excerpt(";".join(f"{name}={value}" for name, value in parameters.items()))
-            accepted = ", ".join(cls.__struct_fields__)
-            reason = str(error)[:MOST_REASON_CHARACTERS]
-            raise InvalidRequest(f"{reason}, in {given}; expected {accepted}", where="parameters") from error
+        kinds = {field.name: field.type for field in msgspec.structs.fields(cls)}
+        require_known(parameters, kinds)
+        return cls(**{name: _value(name, text, kinds[name]) for name, text in parameters.items()})
 
     @property
     def text(self) -> str:
@@ -129,6 +126,15 @@ class Submission:
             return self.parameters.id
         name = re.sub(r"[^A-Za-z0-9_.-]+", "-", self.mission.site_name or "")[:MOST_NAME_CHARACTERS]
         return f"{name.strip('-.') or 'mission'}-{self.fingerprint[:8]}"
+
+
+def _value(name: str, text: str, kind: Any) -> Any:
+    """What the text of a parameter says, as a value of the type `kind`."""
+    try:
+        # Not strict: the parameters of a query are text, those that are numbers as well.
+        return msgspec.convert(text, kind, strict=False)
+    except msgspec.ValidationError as error:
+        raise InvalidRequest(f"is {excerpt(text)}; expected {described(kind)}", where=name) from error
 
 
 @cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -84,7 +85,7 @@ def hot_spots(
         # Hot spots are drawn roughly, and may reach ashore; one that is all on land is a mistake.
         _require_water(geometry, water, frame, where)
         given = shapely.transform(shapely.get_parts(feature.geometry), frame.to_planar)
-        areas = _in_order(_areas(geometry, swath_m), given)
+        areas = _in_order(_areas(geometry, swath_m, outline), given)
         for spot in _spots(areas, f"features[{index}]", _worth(feature, where)):
             if spot.area.intersects(water):
                 spots.append(spot)
@@ -135,11 +136,19 @@ def _require_water(geometry: BaseGeometry, water: BaseGeometry, frame: Frame, wh
         )
 
 
-def _areas(geometry: BaseGeometry, swath_m: float) -> list[Polygon]:
+def _areas(geometry: BaseGeometry, swath_m: float, outline: Polygon) -> list[Polygon]:
     """The polygons of a feature, or the discs about its points."""
     # A point stands for water of unknown extent: a disc in which any pass within a swath of it counts.
-    areas = geometry if geometry.area > 0 else geometry.buffer(swath_m)
-    return [part for part in shapely.get_parts(areas) if part.area > 0]
+    areas = geometry if geometry.area > 0 else _near(geometry.buffer(swath_m), outline)
+    # Twice: what is made valid may be a collection with a multipolygon among its parts.
+    return [part for part in shapely.get_parts(shapely.get_parts(areas)) if part.area > 0]
+
+
+def _near(discs: BaseGeometry, outline: Polygon) -> BaseGeometry:
+    """Discs without what is far from the site: wide ones would reach out of its plane."""
+    west, south, east, north = outline.bounds
+    surroundings = shapely.envelope(outline).buffer(math.hypot(east - west, north - south), join_style="mitre")
+    return discs if discs.within(surroundings) else discs.intersection(surroundings)
 
 
 def _in_order(areas: list[Polygon], given: Geometries) -> list[Polygon]:

@@ -12,7 +12,7 @@ from msgspec import inspect
 
 from oxbow.errors import InvalidRequest
 
-__all__ = ["decode_json", "document_of", "json_names", "part_with_extra", "utf8", "with_extra"]
+__all__ = ["decode_json", "described", "document_of", "json_names", "part_with_extra", "utf8", "with_extra"]
 
 T = TypeVar("T")
 
@@ -179,6 +179,11 @@ def document_of(value: msgspec.Struct) -> dict[str, Any]:
 def json_names(kind: type[msgspec.Struct]) -> dict[str, str]:
     """The name of each field in JSON, except `extra`."""
     return {field.name: field.encode_name for field in msgspec.structs.fields(kind) if field.name != EXTRA}
+
+
+def described(kind: Any) -> str:
+    """What is accepted for a type that msgspec can decode, in words, for errors: ``true or false``."""
+    return _described(inspect.type_info(kind))
 
 
 def _located(problem: str, data: bytes) -> str:

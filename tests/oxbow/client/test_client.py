@@ -20,7 +20,7 @@ from oxbow.bus.router import start_router
 from oxbow.contracts import PLAN_KEY, MissionState, MissionStatus, live_key, mission_key
 from oxbow.errors import Cancelled, ErrorCode, Internal, InvalidRequest, OxbowError
 from oxbow.mission.file import mission_json, parse_mission
-from oxbow.planning.submission import Submission
+from oxbow.planning.submission import Submission, SubmissionParameters
 from tests.support.mission_files import listening, mission_file, revision_of
 from tests.support.mission_processes import STAGES, end, launch
 
@@ -119,7 +119,7 @@ def impostor() -> Iterator[tuple[str, dict[str, Any]]]:
             def answer(key: str, _parameters: Any, payload: bytes, what: str = what) -> Any:
                 yield key, answers[what](payload)
 
-            session.answer(key, answer)
+            session.answer(key, answer, parameters=SubmissionParameters.__struct_fields__)
         session.declare_live(live_key("mission", "impostor"))
         yield running.endpoint, answers
     running.process.terminate()

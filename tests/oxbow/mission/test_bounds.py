@@ -23,8 +23,8 @@ LENGTHS = {
     "Slave_length": (LEAST, MOST),
     "Master_speed": (LEAST, MOST),
     "Slave_speed": (LEAST, MOST),
-    "Minimal_spatial_rate": (LEAST, MOST),
-    "Swath": (LEAST, MOST),
+    "Minimal_spatial_rate": (LEAST, FARTHEST),
+    "Swath": (LEAST, FARTHEST),
     "Footprint": (LEAST, FARTHEST),
     "Danger_detour": (0.0, MOST),
     "Safety": (0.0, FARTHEST),
@@ -109,3 +109,26 @@ def test_a_safety_that_leaves_no_water_is_told_in_the_mission_files_words(safety
         planned(Safety=safety, **vehicles)
     assert str(caught.value).startswith(f"Safety: is {safety:g} m, which leaves no free water")
     assert "safety_m" not in str(caught.value)
+
+
+POINT = {
+    "type": "Feature",
+    "geometry": {"type": "Point", "coordinates": [1.01, 46.01]},
+    "properties": {"value": 40.0},
+}
+
+
+@pytest.mark.parametrize("width", ["Swath", "Minimal_spatial_rate"])
+def test_the_widest_swath_treats_a_point_in_one_pass(width):
+    hot_spots = {"type": "FeatureCollection", "features": [POINT]}
+    given = mission(MissionType="treat", PriorModel=hot_spots, **{width: FARTHEST})
+    [treated] = plan_mission(given, call=local_call()).plan.treatment.hot_spots
+    assert treated.treated_share == pytest.approx(1.0)
+
+
+def test_the_greatest_spatial_rate_is_refused_by_its_own_name_where_it_exceeds_the_water():
+    given = mission(Minimal_spatial_rate=FARTHEST)
+    with pytest.raises(
+        InvalidMission, match=r"^Minimal_spatial_rate: is 2\.1e\+07 m; expected at most the extent"
+    ):
+        plan_mission(given, PlanOptions(method=Method.TRANSECT), call=local_call())

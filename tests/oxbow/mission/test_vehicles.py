@@ -80,6 +80,8 @@ def test_what_a_vehicle_leaves_out_is_the_missions():
         (["a"], "Vehicles[0]", "object"),
         ([boat(), boat("b"), boat()], "Vehicles[2].Name", "'a'"),
         ([boat("")], "Vehicles[0].Name", "empty"),
+        ([boat(), boat("x" * 129)], "Vehicles[1].Name", "(129 characters); expected at most 128 characters"),
+        ([boat("x" * 10**6), boat("x" * 10**6)], "Vehicles[0].Name", "(1000000 characters)"),
         ([{"Role": "slave"}], "Vehicles[0].Name", "missing"),
         ([boat(), boat("b", "captain")], "Vehicles[1].Role", "captain"),
         ([boat(Length=0.0)], "Vehicles[0].Length", "0.0"),
