@@ -94,7 +94,7 @@ class Session(Closing):
             except zenoh.ZError as error:
                 if time.monotonic() >= give_up:
                     raise Unavailable(
-                        f"no router answers there within {timeout_s:g} s; start one with `oxbow up`",
+                        f"no router answers there within {timeout_s:g} s; start one with: oxbow up",
                         where=endpoint,
                     ) from error
                 time.sleep(0.05)

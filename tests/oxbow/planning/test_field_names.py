@@ -74,6 +74,19 @@ def test_every_field_that_a_stage_speaks_of_is_in_the_table():
     assert {"safety_m", "least_width_m", "shore_tolerance_m", "min_spacing_m"} <= quoted <= set(names)
 
 
+READERS = {
+    ROOT / "common/oxbow" / name for name in ("wire/codec.py", "wire/strict_json.py", "planning/field_names.py")
+}
+"""Modules that read the backquotes of others, in patterns."""
+
+
+def test_nothing_but_a_field_that_a_stage_speaks_of_is_between_backquotes():
+    others = {source for folder in ("common", "services") for source in (ROOT / folder).rglob("*.py")}
+    others -= {*SOURCES, *READERS}
+    assert len(others) > 100
+    assert [text for source in sorted(others) for text in texts_of(source) if "`" in text] == []
+
+
 def field_names(*structs):
     return {field.name for struct in structs for field in fields(struct)}
 
