@@ -1,5 +1,7 @@
 """Measure Oxbow: ``python -m tests.bench [SECTION ...]``, all sections where none is named.
 
+``python -m tests.bench against REVISION`` compares with another revision.
+
 Prints a table for each, and keeps the figures in `out/bench.json`. A goal that is missed is said, and is no
 failure: how fast a machine is, is no property of the project.
 """
@@ -9,10 +11,11 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 
 from rich.console import Console
 
-from tests.bench import assignment, meshes, quality, routes, stack, stages
+from tests.bench import against, assignment, meshes, quality, routes, stack, stages
 from tests.bench.results import Section, keep, show
 from tests.support.project import ROOT
 
@@ -33,20 +36,29 @@ RESULTS = ROOT / "out" / "bench.json"
 
 def main() -> None:
     """Run the sections that the command line names."""
-    parser = argparse.ArgumentParser(prog="python -m tests.bench", description="Measure Oxbow.")
-    parser.add_argument("sections", nargs="*", metavar="SECTION", help=", ".join(SECTIONS))
-    names = parser.parse_args().sections or list(SECTIONS)
-    if unknown := set(names) - set(SECTIONS):
-        parser.error(f"no section {', '.join(sorted(unknown))}; expected some of {', '.join(SECTIONS)}")
     console = Console(width=None if Console().is_terminal else 170)
-    for name in names:
+    for name, measure in _asked().items():
         started = time.monotonic()
         tables = []
-        for table in SECTIONS[name]():
+        for table in measure():
             show(table, console)
             tables.append(table)
         keep({name: tables}, RESULTS)
         console.print(f"[dim]{name}: {time.monotonic() - started:.0f} s; kept in {RESULTS}[/dim]\n")
+
+
+def _asked() -> dict[str, Callable[[], Iterator[Section]]]:
+    """What the command line asks for."""
+    parser = argparse.ArgumentParser(prog="python -m tests.bench", description="Measure Oxbow.")
+    parser.add_argument(
+        "sections", nargs="*", metavar="SECTION", help=f"{', '.join(SECTIONS)}; or: against REVISION"
+    )
+    names = parser.parse_args().sections or list(SECTIONS)
+    if names[0] == "against" and len(names) == 2:
+        return {f"against {names[1]}": partial(against.measure_against, names[1])}
+    if unknown := set(names) - set(SECTIONS):
+        parser.error(f"no section {', '.join(sorted(unknown))}; expected some of {', '.join(SECTIONS)}")
+    return {name: SECTIONS[name] for name in names}
 
 
 if __name__ == "__main__":
