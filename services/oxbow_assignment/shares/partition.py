@@ -14,13 +14,13 @@ from shapely import Polygon
 from oxbow.arrays import FloatArray, Indices, Mask, Place
 from oxbow.errors import InvalidRequest
 from oxbow_assignment.shares.balancing import balanced_shares, border_lengths_m, imbalance
+from oxbow_assignment.shares.dues import attainable_areas_m2, due_areas_m2
 from oxbow_assignment.shares.mesh import Mesh, propagate
 
 __all__ = [
     "BALANCE",
     "Partition",
     "balanced_partition",
-    "due_areas_m2",
     "largest_piece",
     "rebalanced",
     "wavefront_partition",
@@ -205,8 +205,10 @@ def rebalanced(partition: Partition, capacities: FloatArray, allowed: Mask) -> P
     Partition
         On the same mesh.
     """
-    share = _balanced(partition.mesh, partition.share, capacities, allowed)
-    return Partition.of(partition.mesh, share, capacities)
+    mesh = partition.mesh
+    share = _within_reach(mesh, partition.share, allowed)
+    share = _evened(mesh, share, attainable_areas_m2(mesh, share, capacities, allowed), allowed)
+    return Partition.of(mesh, share, capacities)
 
 
 def _checked(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None) -> FloatArray:
@@ -223,30 +225,6 @@ def _checked(mesh: Mesh, starts: Sequence[Place], capacities: FloatArray | None)
 
 def _everywhere(mesh: Mesh, starts: Sequence[Place]) -> Mask:
     return np.ones((len(starts), len(mesh)), dtype=bool)
-
-
-def due_areas_m2(mesh: Mesh, share: Indices, capacities: FloatArray) -> FloatArray:
-    """The area due to every share in proportion to capacities, in m2, shape (k,).
-
-    Each connected piece of the mesh is shared among the vehicles that have a share in it.
-
-    Parameters
-    ----------
-    mesh
-        The mesh.
-    share
-        The vehicle of every triangle, 0 to k - 1, shape (m,); every share lies in one piece of the mesh.
-    capacities
-        What each vehicle can cover, in any unit, shape (k,).
-
-    Returns
-    -------
-    ndarray of float, shape (k,)
-        They add up to the area of the mesh.
-    """
-    piece = mesh.pieces[np.unique(share, return_index=True)[1]]
-    areas_m2 = np.bincount(mesh.pieces, mesh.areas_m2)
-    return np.asarray(areas_m2[piece] * capacities / np.bincount(piece, capacities)[piece])
 
 
 def _rounds(mesh: Mesh, seeds: Indices, capacities: FloatArray, allowed: Mask) -> Iterator[Indices]:
@@ -274,10 +252,15 @@ def _matched(mesh: Mesh, share: Indices, allowed: Mask) -> Indices:
 
 def _balanced(mesh: Mesh, share: Indices, capacities: FloatArray, allowed: Mask) -> Indices:
     """Balanced shares of allowed triangles, as far as possible."""
-    # Once before, since only allowed triangles change hands, and once after, since a transfer may cut some off.
+    # Before, since only allowed triangles change hands.
     share = _within_reach(mesh, share, allowed)
-    share = balanced_shares(mesh, share, due_areas_m2(mesh, share, capacities), allowed)
-    return _within_reach(mesh, share, allowed)
+    return _evened(mesh, share, due_areas_m2(mesh, share, capacities), allowed)
+
+
+def _evened(mesh: Mesh, share: Indices, due_m2: FloatArray, allowed: Mask) -> Indices:
+    """Shares of allowed triangles, nearer to what is due."""
+    # After, since a transfer may cut some off.
+    return _within_reach(mesh, balanced_shares(mesh, share, due_m2, allowed), allowed)
 
 
 def _with_all(share: Indices, allowed: Mask) -> Indices:

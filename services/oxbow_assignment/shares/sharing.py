@@ -19,12 +19,12 @@ from oxbow.arrays import FloatArray, Mask, Place
 from oxbow.contracts import DroppedPart, Vehicle
 from oxbow.errors import InvalidRequest
 from oxbow_assignment.shares.balancing import imbalance
+from oxbow_assignment.shares.dues import due_areas_m2
 from oxbow_assignment.shares.mesh import Mesh, mesh_area, propagate
 from oxbow_assignment.shares.partition import (
     BALANCE,
     Partition,
     balanced_partition,
-    due_areas_m2,
     largest_piece,
     rebalanced,
 )

@@ -81,6 +81,13 @@ def test_far_shares_are_the_smaller():
     assert not found.warnings
 
 
+def test_what_is_due_to_boats_but_out_of_their_reach_is_passed_on_to_those_beyond():
+    """Together, the four of short range are due more than the 1500 m of the canal that they reach."""
+    found = shares(CANAL, boats(*[3_000.0] * 4, 12_000.0, 12_000.0))
+    assert dropped_m2(found) == 0.0
+    assert found.imbalance <= BALANCE
+
+
 @pytest.mark.parametrize("order", list(itertools.permutations([3_000.0, 6_000.0, 12_000.0])))
 def test_far_water_goes_to_those_who_reach_it(order):
     found = shares(CANAL, boats(*order))
