@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely import LineString
 
-from oxbow.contracts import Method, PathPlan, PathRequest
+from oxbow.contracts import Method, PathPlan, PathRequest, dropped_warnings
 from oxbow.contracts.budget import WELL_USED
 from oxbow.wire.recording import Show
 from oxbow_path.approach import plan_with_legs, within_share
@@ -93,17 +93,19 @@ def planned_path(request: PathRequest, stop: Stop, show: Show, spent_m: float = 
     path = _from_launch_to_recovery(shapely.transform(found, display.back), request)
     # After the last change to the path: turned back, and with its ends set.
     require_conforming(path, request)
+    free = request.space.free
+    dropped = dropped_parts(
+        path,
+        free,
+        plan.reach_m * claimed_m / plan.spacing_m,
+        is_spent=path.length >= WELL_USED * request.length_m,
+    )
     return PathPlan(
         path=path,
         spacing_m=claimed_m,
         steps=plan.steps,
-        dropped=dropped_parts(
-            path,
-            request.space.free,
-            plan.reach_m * claimed_m / plan.spacing_m,
-            is_spent=path.length >= WELL_USED * request.length_m,
-        ),
-        warnings=tuple(_length_warnings(plan, task)),
+        dropped=dropped,
+        warnings=(*_length_warnings(plan, task), *dropped_warnings(dropped, free.area, "its water")),
     )
 
 

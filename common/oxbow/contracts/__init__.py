@@ -19,7 +19,7 @@ from oxbow.contracts.certificate import (
     Variogram,
     VariogramModel,
 )
-from oxbow.contracts.contour import ContourRequest, DroppedPart, FreeSpace
+from oxbow.contracts.contour import ContourRequest, DroppedPart, FreeSpace, dropped_warnings
 from oxbow.contracts.danger import DANGER_DETOUR_M, DangerZone, Per
 from oxbow.contracts.decomposition import (
     Cell,
@@ -136,6 +136,7 @@ __all__ = [
     "any_introspection_key",
     "any_layer_key",
     "checked_id",
+    "dropped_warnings",
     "introspection_key",
     "layer_key",
     "live_key",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from shapely import Polygon
 
 from oxbow.arrays import Place
@@ -15,7 +17,10 @@ from oxbow.contracts.message import (
 )
 from oxbow.tolerances import DEFAULT_SHORE_TOLERANCE_M, FARTHEST_M
 
-__all__ = ["ContourRequest", "DroppedPart", "FreeSpace"]
+__all__ = ["ContourRequest", "DroppedPart", "FreeSpace", "dropped_warnings"]
+
+MUCH_DROPPED = 0.05
+"""A plan that leaves out more than this share of the water says so in a warning."""
 
 
 class DroppedPart(Message, frozen=True, kw_only=True):
@@ -30,6 +35,30 @@ class DroppedPart(Message, frozen=True, kw_only=True):
         require_finite(self, "area_m2", least=0.0)
         require_place(self, "place")
         require_area(self, "outline")
+
+
+def dropped_warnings(parts: Sequence[DroppedPart], area_m2: float, whose: str) -> tuple[str, ...]:
+    """A warning where much water is left out: a list of parts is easily overlooked.
+
+    Parameters
+    ----------
+    parts
+        What is left out.
+    area_m2
+        The area of all water, > 0.
+    whose
+        What that water is called.
+
+    Returns
+    -------
+    tuple of str
+        One text, with the reason of the largest part; none up to a twentieth of the water.
+    """
+    share = sum(part.area_m2 for part in parts) / area_m2
+    if share <= MUCH_DROPPED:
+        return ()
+    largest = max(parts, key=lambda part: part.area_m2)
+    return (f"{share:.1%} of {whose} is left out, most of it {largest.reason}",)
 
 
 class ContourRequest(Message, frozen=True, kw_only=True):

@@ -16,7 +16,7 @@ import shapely
 from shapely import Polygon
 
 from oxbow.arrays import FloatArray, Mask, Place
-from oxbow.contracts import DroppedPart, Vehicle
+from oxbow.contracts import DroppedPart, Vehicle, dropped_warnings
 from oxbow.errors import InvalidRequest
 from oxbow_assignment.shares.balancing import imbalance
 from oxbow_assignment.shares.dues import due_areas_m2
@@ -124,14 +124,18 @@ def share_water(
     partition = _by_length_left(partition, reach)
     own = _own(partition, reach)
     uneven = _imbalance(partition, reach)
+    dropped = (
+        *_dropped(mesh, within, TOO_FAR),
+        *_dropped(partition.mesh, np.logical_or.reduce(own), BOXED_IN),
+    )
     return Sharing(
         areas=tuple(partition.mesh.region(triangles) for triangles in own),
         imbalance=uneven,
-        dropped=(
-            *_dropped(mesh, within, TOO_FAR),
-            *_dropped(partition.mesh, np.logical_or.reduce(own), BOXED_IN),
+        dropped=dropped,
+        warnings=(
+            *((_uneven(partition, reach, masters),) if uneven > BALANCE else ()),
+            *dropped_warnings(dropped, free.area, "the water"),
         ),
-        warnings=(_uneven(partition, reach, masters),) if uneven > BALANCE else (),
         partition=partition,
     )
 

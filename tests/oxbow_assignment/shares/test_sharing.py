@@ -67,6 +67,8 @@ def test_what_no_boat_can_see_and_be_home_is_dropped_by_name(count):
     for number in range(count):
         assert 2 * span(found, f"{number}")[1] <= 8_000.0
     assert "shares are not even" in found.warnings[0]
+    left_out = f"{part.area_m2 / CANAL.area:.1%} of the water is left out, most of it {part.reason}"
+    assert found.warnings[1:] == (left_out,)
 
 
 def test_far_shares_are_the_smaller():

@@ -105,7 +105,11 @@ def test_half_a_moat_is_named():
     asked = request(moat, spacings=0.5 * 952 / np.sqrt(moat.area), safety=0.02, launch=(6, 100))
     plan = handle(asked, discard)
     require_sound(plan, asked)
-    assert sum(part.area_m2 for part in plan.dropped) >= 0.3 * asked.space.free.area
+    assert (dropped_m2 := sum(part.area_m2 for part in plan.dropped)) >= 0.3 * asked.space.free.area
+    (left_out,) = [text for text in plan.warnings if "is left out" in text]
+    assert left_out.startswith(
+        f"{dropped_m2 / asked.space.free.area:.1%} of its water is left out, most of it farther"
+    )
 
 
 def test_a_loop_round_a_chain_of_islands_holds_them_all():
