@@ -65,19 +65,23 @@ def measure_against(revision: str) -> Iterator[Section]:
 
 @contextmanager
 def _installed(revision: str) -> Iterator[Path]:
-    """The Python of a checkout of a revision, installed beside it; both are removed at the end."""
+    """The Python of a clone of a revision, installed beside it; both are removed at the end."""
     with tempfile.TemporaryDirectory() as folder:
+        # A clone, not a worktree, which would be registered in this repository however the run ends.
         tree = Path(folder) / "tree"
-        _run("git", "-C", str(ROOT), "worktree", "add", "--quiet", "--detach", str(tree), revision)
-        try:
-            _run(sys.executable, "-m", "venv", str(tree / ".venv"))
-            python = tree / ".venv/bin/python"
-            install = (str(python), "-m", "pip", "install", "--quiet")
-            _run(*install, *_dependencies())
-            _run(*install, "--no-build-isolation", "--no-deps", "--editable", str(tree))
-            yield python
-        finally:
-            _run("git", "-C", str(ROOT), "worktree", "remove", "--force", str(tree))
+        _run("git", "clone", "--quiet", "--no-checkout", str(ROOT), str(tree))
+        _run("git", "-C", str(tree), "checkout", "--quiet", _commit(revision))
+        _run(sys.executable, "-m", "venv", str(tree / ".venv"))
+        python = tree / ".venv/bin/python"
+        install = (str(python), "-m", "pip", "install", "--quiet")
+        _run(*install, *_dependencies())
+        _run(*install, "--no-build-isolation", "--no-deps", "--editable", str(tree))
+        yield python
+
+
+def _commit(revision: str) -> str:
+    """The commit that this repository knows by a name: a clone need not have the name."""
+    return _run("git", "-C", str(ROOT), "rev-parse", "--verify", f"{revision}^{{commit}}").strip()
 
 
 def _dependencies() -> list[str]:
