@@ -103,8 +103,8 @@ class Site:
         InvalidMission
             A contour has no area, the outline meets itself or reaches farther than 300 km from its mean
             point, a point lies farther than that from the water, a vehicle starts or is recovered farther ashore
-            than the mission's tolerance, or what is to be treated is missing, on land or overlaps; the error names
-            field, index and value.
+            than the mission's tolerance, the least spacing exceeds the water, or what is to be treated is
+            missing, on land or overlaps; the error names field, index and value.
         Infeasible
             The forbidden zones cover all of the water.
         """
@@ -123,6 +123,9 @@ class Site:
             raise Infeasible("cover all of the water; nothing is left to plan on", where="ForbiddenZones")
         # 3. What the prior model says of it: where to survey more, what to treat, where harm threatens.
         areas = () if mission.prior_model is None else weighted_areas(mission.prior_model, frame, outline)
+        if mission.mission_type is not MissionType.TREAT:
+            # Of a treatment, the rate may stand in for the swath, which may be wider than any hot spot.
+            _require_rate_within(mission.minimal_spatial_rate_m, water)
         spots = _hot_spots(mission, frame, outline, water)
         dangers = danger_zones(mission, frame, outline)
 
@@ -199,6 +202,17 @@ def _hot_spots(mission: Mission, frame: Frame, outline: Polygon, water: BaseGeom
             where="PriorModel",
         )
     return found
+
+
+def _require_rate_within(rate_m: float | None, water: BaseGeometry) -> None:
+    """Check that the water is as wide as the least spacing, before any stage plans ways that far apart."""
+    x0, y0, x1, y1 = water.bounds
+    extent_m = float(np.hypot(x1 - x0, y1 - y0))
+    if rate_m is not None and rate_m > extent_m:
+        raise InvalidMission(
+            f"is {rate_m:g} m; expected at most the extent of the water, {extent_m:.0f} m",
+            where="Minimal_spatial_rate",
+        )
 
 
 def _nominal_spacing_m(mission: Mission, fleet: Sequence[Member], area_m2: float) -> float:

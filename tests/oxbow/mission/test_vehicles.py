@@ -233,3 +233,10 @@ def test_paths_are_read_and_written():
     assert [planned.name for planned in mission.planned_paths] == ["a"]
     with pytest.raises(InvalidMission, match=r"Paths\[0\].Path\[1\].lat"):
         parsed(Paths=[{"Name": "a", "Role": "slave", "Path": [path[0], at(99.0, 1.0)]}])
+
+
+@pytest.mark.parametrize("vehicles", [None, [boat(role="master"), boat("b", role="master")]])
+def test_a_least_spacing_beyond_the_water_is_refused_however_many_share_it(vehicles):
+    changes = {"Minimal_spatial_rate": 9000.0} | ({} if vehicles is None else {"Vehicles": vehicles})
+    with pytest.raises(InvalidMission, match=r"Minimal_spatial_rate: is 9000 m; expected at most the extent"):
+        Site.of(parsed("map", **changes))
