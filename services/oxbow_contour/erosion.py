@@ -9,8 +9,8 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from oxbow.arrays import FloatArray
-from oxbow_contour.rings import GeometryArray, rings_of, runs_of
+from oxbow.arrays import FloatArray, Geometries
+from oxbow.geometry.rings import rings_of, runs_of
 
 __all__ = ["erode"]
 
@@ -48,7 +48,7 @@ def erode(water: Sequence[Polygon | MultiPolygon], distance_m: float, excess_m: 
     return sorted((part for part in parts if part.area > 0), key=lambda part: (-part.area, part.bounds))
 
 
-def _dilated(rings: Sequence[FloatArray], distance_m: float, chords: int) -> GeometryArray:
+def _dilated(rings: Sequence[FloatArray], distance_m: float, chords: int) -> Geometries:
     """What is near the rings, in parts whose union it is: all of it, and up to the chords' excess more.
 
     GEOS straightens a line before it dilates it, and so leaves out some of the distance where short edges lie
@@ -57,7 +57,7 @@ def _dilated(rings: Sequence[FloatArray], distance_m: float, chords: int) -> Geo
     runs = np.concatenate([runs_of(ring, RUN) for ring in rings])
     # Larger by so much that the middles of the chords, too, keep the distance.
     radius_m = distance_m / _nearest(chords)
-    bands: GeometryArray = shapely.buffer(runs, radius_m, quad_segs=chords)
+    bands: Geometries = shapely.buffer(runs, radius_m, quad_segs=chords)
     # Measured rather than trusted: whatever GEOS did to the line, its band must reach the distance all around it.
     is_short = shapely.distance(shapely.boundary(bands), runs) < distance_m
     edges = [runs_of(shapely.get_coordinates(run), 1) for run in runs[is_short]]

@@ -10,8 +10,8 @@ import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 
 from oxbow.arrays import FloatArray, Indices, Mask
+from oxbow.geometry.rings import rings_of
 from oxbow.tolerances import DISTANCE_ROUNDING
-from oxbow_contour.rings import rings_of
 from oxbow_contour.strips import deviations, strip_ends
 
 __all__ = ["Simplified", "simplify"]

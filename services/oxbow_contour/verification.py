@@ -9,8 +9,8 @@ import numpy as np
 import shapely
 from shapely import Polygon, STRtree
 
+from oxbow.geometry.rings import rings_of, runs_of
 from oxbow.tolerances import DISTANCE_ROUNDING
-from oxbow_contour.rings import rings_of, runs_of
 
 __all__ = ["inscribed_radius_m", "is_safe", "rounded_down"]
 

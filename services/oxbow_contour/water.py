@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import shapely
 from shapely import Polygon, STRtree
 
+from oxbow.arrays import Geometries
 from oxbow.errors import Infeasible
-from oxbow_contour.rings import GeometryArray
 
 __all__ = ["true_water"]
 
@@ -44,7 +44,7 @@ def true_water(outline: Polygon, zones: Sequence[Polygon]) -> tuple[Polygon, ...
     return parts
 
 
-def _are_islands(land: GeometryArray, outline: Polygon) -> bool:
+def _are_islands(land: Geometries, outline: Polygon) -> bool:
     """Whether polygons are holes of the outline as they stand: apart, in its interior and without holes."""
     shapely.prepare(outline)
     if not shapely.contains_properly(outline, land).all() or shapely.get_num_interior_rings(land).any():

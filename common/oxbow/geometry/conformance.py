@@ -24,6 +24,7 @@ from shapely.ops import substring
 from oxbow.arrays import FloatArray, Geometries, Place
 from oxbow.contracts import Fault, Leg, Rule
 from oxbow.geometry.narrows import DETOUR, direct_leg_m, is_basin, without_narrows
+from oxbow.geometry.rings import runs_of
 from oxbow.geometry.route.gate_routes import Routes
 from oxbow.geometry.stretches import PathSegments, clipped_stretches, covered_m, gaps_between, merged_stretches
 from oxbow.tolerances import ROUNDING_M
@@ -108,7 +109,7 @@ class Shore:
     def _runs(self) -> STRtree:
         """The boundary in runs of a few edges."""
         rings = shapely.get_rings(shapely.get_parts(self.water))
-        return STRtree(np.concatenate([_runs_of(shapely.get_coordinates(ring)) for ring in rings]))
+        return STRtree(np.concatenate([runs_of(shapely.get_coordinates(ring), RUN) for ring in rings]))
 
     @cached_property
     def _parts(self) -> Geometries:
@@ -362,11 +363,3 @@ def _leg_faults(end: _End, leg: Leg, path: LineString) -> Iterator[Fault]:
         yield Fault(rule=Rule.OUTSIDE, metres=over_land_m, place=place, leg=end.name)
     if leg.unsafe_m > leg.most_unsafe_m:
         yield Fault(rule=Rule.UNSAFE, metres=leg.unsafe_m - leg.most_unsafe_m, place=place, leg=end.name)
-
-
-def _runs_of(ring: FloatArray) -> Geometries:
-    """A closed ring as line strings of a few edges each."""
-    first = np.arange(0, len(ring) - 1, RUN)
-    sizes = np.minimum(first + RUN, len(ring) - 1) - first + 1
-    point = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes - first, sizes)
-    return np.asarray(shapely.linestrings(ring[point], indices=np.repeat(np.arange(len(first)), sizes)))
